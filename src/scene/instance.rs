@@ -1,0 +1,64 @@
+//! Placed meshes.
+
+use super::name_or_index;
+use crate::Error;
+use glam::DAffine3;
+
+/// One placement of a mesh with a material.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instance {
+    /// Name for messages; may be empty.
+    pub name: String,
+    /// Index into [`Scene::meshes`](super::Scene::meshes).
+    pub mesh: usize,
+    /// Index into [`Scene::materials`](super::Scene::materials).
+    pub material: usize,
+    /// Mesh to world, `f64`. Mirroring transforms are fine: the front face follows.
+    pub transform: DAffine3,
+    /// Whether environment maps see it. Small or far decoration that need not reflect light may stay out of them.
+    pub in_env_maps: bool,
+    /// Whether it blocks direct light.
+    pub casts_shadow: bool,
+}
+
+impl Instance {
+    /// A mesh where it was modelled, seen by everything.
+    pub fn new(mesh: usize, material: usize) -> Self {
+        Self {
+            name: String::new(),
+            mesh,
+            material,
+            transform: DAffine3::IDENTITY,
+            in_env_maps: true,
+            casts_shadow: true,
+        }
+    }
+
+    /// Checks this instance against the lengths of the lists that it refers to.
+    ///
+    /// # Errors
+    /// [`Error::InvalidScene`].
+    pub fn validate(&self, index: usize, mesh_count: usize, material_count: usize) -> Result<(), Error> {
+        let error = |field: &str, problem: String| {
+            Err(Error::scene(
+                "instance",
+                name_or_index(&self.name, index),
+                field,
+                problem,
+            ))
+        };
+        if self.mesh >= mesh_count {
+            return error("mesh", format!("is {}, but there are {mesh_count} meshes", self.mesh));
+        }
+        if self.material >= material_count {
+            return error(
+                "material",
+                format!("is {}, but there are {material_count} materials", self.material),
+            );
+        }
+        if !self.transform.is_finite() {
+            return error("transform", "is not finite".into());
+        }
+        Ok(())
+    }
+}

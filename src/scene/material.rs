@@ -1,0 +1,173 @@
+//! Surface materials and the images they use, by the conventions of glTF 2.0.
+
+use super::name_or_index;
+use crate::Error;
+
+/// Index of refraction where a material names none.
+const DEFAULT_INDEX_OF_REFRACTION: f32 = 1.5;
+
+/// A surface. All surfaces reflect on both sides; emission leaves the front side only.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Material {
+    /// Name for messages; may be empty.
+    pub name: String,
+    /// Reflectance, linear RGB, each in [0, 1]. Lambertian BRDF = `base_color` / π.
+    pub base_color: [f32; 3],
+    /// Multiplied with `base_color`; its alpha is opacity. Index into [`Scene::textures`](super::Scene::textures).
+    pub base_color_texture: Option<usize>,
+    /// Above 0.5 the surface is a metal.
+    pub metallic: f32,
+    /// Perceptual roughness in [0, 1]; GGX α = roughness².
+    pub roughness: f32,
+    /// Multiplies `roughness` (green) and `metallic` (blue). Index into the scene's textures.
+    pub metallic_roughness_texture: Option<usize>,
+    /// Emitted radiance, W/m²/sr, linear RGB, front side.
+    pub emission: [f32; 3],
+    /// Multiplied with `emission`. Index into the scene's textures.
+    pub emission_texture: Option<usize>,
+    /// Above 0.5 the surface is a dielectric that transmits light.
+    pub transmission: f32,
+    /// Index of refraction of a transmitting material, at least 1.
+    pub index_of_refraction: f32,
+    /// Texels whose opacity is below this are holes; `None`: no holes.
+    pub alpha_cutoff: Option<f32>,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            name: String::new(),
+            base_color: [1.0; 3],
+            base_color_texture: None,
+            metallic: 0.0,
+            roughness: 1.0,
+            metallic_roughness_texture: None,
+            emission: [0.0; 3],
+            emission_texture: None,
+            transmission: 0.0,
+            index_of_refraction: DEFAULT_INDEX_OF_REFRACTION,
+            alpha_cutoff: None,
+        }
+    }
+}
+
+impl Material {
+    /// A Lambertian surface of this reflectance.
+    pub fn diffuse(name: &str, base_color: [f32; 3]) -> Self {
+        Self {
+            name: name.into(),
+            base_color,
+            ..Self::default()
+        }
+    }
+
+    /// Whether the surface emits light.
+    pub fn is_emissive(&self) -> bool {
+        self.emission.iter().any(|&e| e > 0.0)
+    }
+
+    /// Whether light passes through.
+    pub fn is_transmissive(&self) -> bool {
+        self.transmission > 0.5
+    }
+
+    /// Whether the surface is a metal.
+    pub fn is_metal(&self) -> bool {
+        self.metallic > 0.5 && !self.is_transmissive()
+    }
+
+    /// Checks every factor and texture index.
+    ///
+    /// # Errors
+    /// [`Error::InvalidScene`].
+    pub fn validate(&self, index: usize, texture_count: usize) -> Result<(), Error> {
+        let error = |field: &str, problem: String| {
+            Err(Error::scene(
+                "material",
+                name_or_index(&self.name, index),
+                field,
+                problem,
+            ))
+        };
+        let unit_fields = [
+            ("base_color red", self.base_color[0]),
+            ("base_color green", self.base_color[1]),
+            ("base_color blue", self.base_color[2]),
+            ("metallic", self.metallic),
+            ("roughness", self.roughness),
+            ("transmission", self.transmission),
+            ("alpha_cutoff", self.alpha_cutoff.unwrap_or(0.0)),
+        ];
+        for (field, value) in unit_fields {
+            if !(0.0..=1.0).contains(&value) {
+                return error(field, format!("is {value}; expected between 0 and 1"));
+            }
+        }
+        if !self.emission.iter().all(|e| e.is_finite() && *e >= 0.0) {
+            return error(
+                "emission",
+                format!("is {:?}; expected finite and not negative", self.emission),
+            );
+        }
+        if !(self.index_of_refraction >= 1.0 && self.index_of_refraction.is_finite()) {
+            return error(
+                "index_of_refraction",
+                format!("is {}; expected at least 1", self.index_of_refraction),
+            );
+        }
+        let textures = [
+            ("base_color_texture", self.base_color_texture),
+            ("metallic_roughness_texture", self.metallic_roughness_texture),
+            ("emission_texture", self.emission_texture),
+        ];
+        for (field, texture) in textures {
+            if let Some(texture) = texture.filter(|&t| t >= texture_count) {
+                return error(field, format!("is {texture}, but there are {texture_count} textures"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// An image, four bytes per texel, rows from the top. Coordinates repeat; filtering is linear.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Texture {
+    /// Name for messages; may be empty.
+    pub name: String,
+    /// Width in texels.
+    pub width: u32,
+    /// Height in texels.
+    pub height: u32,
+    /// Whether RGB is sRGB-encoded (colours) or linear (roughness and the like).
+    pub srgb: bool,
+    /// RGBA, `4 * width * height` bytes.
+    pub rgba: Vec<u8>,
+}
+
+impl Texture {
+    /// Checks size and length.
+    ///
+    /// # Errors
+    /// [`Error::InvalidScene`].
+    pub fn validate(&self, index: usize) -> Result<(), Error> {
+        let error = |field: &str, problem: String| {
+            Err(Error::scene(
+                "texture",
+                name_or_index(&self.name, index),
+                field,
+                problem,
+            ))
+        };
+        if self.width == 0 || self.height == 0 {
+            return error(
+                "size",
+                format!("is {}×{}; expected at least 1×1", self.width, self.height),
+            );
+        }
+        let expected = 4 * self.width as usize * self.height as usize;
+        if self.rgba.len() != expected {
+            return error("rgba", format!("holds {} bytes; expected {expected}", self.rgba.len()));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,111 @@
+//! Layer 1: what a scene is, on the CPU. Nothing here touches the GPU.
+//!
+//! Lengths are in the host's own unit, radiometric quantities in watts over that unit; transforms are `f64`, so that a
+//! scene may stand far from its origin. [`UnitFrame`] maps all of it to the numbers that the GPU sees.
+
+mod bounds;
+mod camera;
+mod instance;
+mod light;
+mod material;
+mod mesh;
+#[cfg(feature = "samples")]
+pub mod samples;
+mod summary;
+mod unit_frame;
+
+pub use bounds::SceneBounds;
+pub use camera::{Camera, Projection};
+pub use instance::Instance;
+pub use light::{Light, LightKind};
+pub use material::{Material, Texture};
+pub use mesh::Mesh;
+pub use summary::SceneSummary;
+pub use unit_frame::UnitFrame;
+
+use crate::Error;
+use glam::DVec3;
+
+/// A whole scene: meshes, their materials and placements, lights and cameras. References are indices into these lists.
+#[derive(Debug, Clone, Default)]
+pub struct Scene {
+    /// Triangle meshes.
+    pub meshes: Vec<Mesh>,
+    /// Surface materials.
+    pub materials: Vec<Material>,
+    /// Images that materials refer to.
+    pub textures: Vec<Texture>,
+    /// Placed meshes.
+    pub instances: Vec<Instance>,
+    /// Light sources without geometry. Emissive materials shine by themselves.
+    pub lights: Vec<Light>,
+    /// View points.
+    pub cameras: Vec<Camera>,
+}
+
+impl Scene {
+    /// Checks everything that a user can hand in.
+    ///
+    /// # Errors
+    /// [`Error::InvalidScene`] names the first offending mesh, vertex and field; [`Error::InvalidBounds`] if the scene
+    /// has triangles but no extent.
+    pub fn validate(&self) -> Result<(), Error> {
+        for (index, texture) in self.textures.iter().enumerate() {
+            texture.validate(index)?;
+        }
+        for (index, material) in self.materials.iter().enumerate() {
+            material.validate(index, self.textures.len())?;
+        }
+        for (index, mesh) in self.meshes.iter().enumerate() {
+            mesh.validate(index)?;
+        }
+        for (index, instance) in self.instances.iter().enumerate() {
+            instance.validate(index, self.meshes.len(), self.materials.len())?;
+        }
+        for (index, light) in self.lights.iter().enumerate() {
+            light.validate(index)?;
+        }
+        for (index, camera) in self.cameras.iter().enumerate() {
+            camera.validate(index)?;
+        }
+        if self.triangle_count() > 0 {
+            self.bounds()?;
+        }
+        Ok(())
+    }
+
+    /// Triangles over all instances.
+    pub fn triangle_count(&self) -> usize {
+        self.instances
+            .iter()
+            .map(|i| self.meshes[i.mesh].indices.len() / 3)
+            .sum()
+    }
+
+    /// World-space bounds of all vertices that a triangle uses.
+    ///
+    /// # Errors
+    /// [`Error::InvalidBounds`] if there is no geometry or it has no extent.
+    pub fn bounds(&self) -> Result<SceneBounds, Error> {
+        let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for instance in &self.instances {
+            let mesh = &self.meshes[instance.mesh];
+            for &index in &mesh.indices {
+                let p = glam::Vec3::from(mesh.positions[index as usize]).as_dvec3();
+                let p = instance.transform.transform_point3(p);
+                min = min.min(p);
+                max = max.max(p);
+            }
+        }
+        SceneBounds::new(min, max)
+    }
+}
+
+/// Name for messages: the item's own, or its index.
+pub(crate) fn name_or_index(name: &str, index: usize) -> String {
+    if name.is_empty() {
+        format!("#{index}")
+    } else {
+        name.to_owned()
+    }
+}

@@ -1,0 +1,401 @@
+//! Procedural scenes for docs, tests and measurements. Each is a function of time, in seconds; lengths are in metres.
+
+use super::{Camera, Instance, Light, LightKind, Material, Mesh, Projection, Scene};
+use glam::{DAffine3, DVec3, Vec3};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+/// Names accepted by [`by_name`], in the order of this list.
+pub const NAMES: [&str; 5] = ["cornell", "cornell-spot", "plane", "furnace", "two-rooms"];
+
+/// The sample of this name at `time`, or `None` if there is none.
+pub fn by_name(name: &str, time: f64) -> Option<Scene> {
+    Some(match name {
+        "cornell" => cornell(time),
+        "cornell-spot" => cornell_spot(time),
+        "plane" => plane(),
+        "furnace" => furnace(0.5, 1.0),
+        "two-rooms" => two_rooms(time),
+        _ => return None,
+    })
+}
+
+/// The Cornell box (measured geometry, one unit a metre at ten times its size) with a bulb under its ceiling; red
+/// stands left, green right, as the camera sees it. The short block slides back and forth, once in four seconds.
+pub fn cornell(time: f64) -> Scene {
+    let mut scene = cornell_walls(time);
+    scene.lights.push(Light {
+        name: "bulb".into(),
+        ..Light::point(DVec3::new(2.78, 5.0, 2.795), 20.0, [1.0, 0.85, 0.6])
+    });
+    scene
+}
+
+/// The Cornell box lit by a spot that sways.
+pub fn cornell_spot(time: f64) -> Scene {
+    let mut scene = cornell_walls(time);
+    scene.lights.push(Light {
+        name: "spot".into(),
+        kind: LightKind::Spot {
+            position: DVec3::new(2.78, 5.4, 2.795),
+            direction: DVec3::new(0.3 * (TAU * time / 4.0).sin(), -1.0, 0.1),
+            inner_angle: 20f64.to_radians(),
+            outer_angle: 32f64.to_radians(),
+            radius: 0.0,
+        },
+        color: [1.0, 0.95, 0.85],
+        intensity: 60.0,
+    });
+    scene
+}
+
+/// A 200 m square plane of reflectance 0.5, seen from 2 m above, a 10 W/sr bulb 1 m above its centre.
+pub fn plane() -> Scene {
+    let mut builder = Builder::default();
+    let grey = builder.material(Material::diffuse("grey", [0.5; 3]));
+    builder.quad(
+        "plane",
+        [
+            [-100.0, 0.0, 100.0],
+            [100.0, 0.0, 100.0],
+            [100.0, 0.0, -100.0],
+            [-100.0, 0.0, -100.0],
+        ],
+        grey,
+    );
+    builder.scene.lights.push(Light::point(DVec3::Y, 10.0, [1.0; 3]));
+    builder.look(
+        "camera",
+        DVec3::new(0.0, 2.0, 0.0),
+        DVec3::ZERO,
+        DVec3::NEG_Z,
+        FRAC_PI_2,
+    );
+    builder.scene
+}
+
+/// A closed unit sphere seen from inside, of this reflectance and emitted radiance: everywhere L = L_e / (1 − ρ).
+pub fn furnace(reflectance: f32, emitted_radiance: f32) -> Scene {
+    let mut builder = Builder::default();
+    let wall = builder.material(Material {
+        emission: [emitted_radiance; 3],
+        ..Material::diffuse("wall", [reflectance; 3])
+    });
+    builder.mesh(inward_sphere("furnace", 24, 48), wall);
+    builder.look("camera", DVec3::ZERO, DVec3::NEG_Z, DVec3::Y, FRAC_PI_2);
+    builder.scene
+}
+
+/// Thickness of the door in [`two_rooms`], metres.
+pub const DOOR_THICKNESS: f64 = 0.05;
+
+/// Two rooms of 4 × 3 × 4 m with a doorway between them, a bulb in the near one (z < 0), the camera in the far one.
+/// The door, [`DOOR_THICKNESS`] thick and wider than its frame, is closed at time 0 and open from 1 to 3; the cycle
+/// lasts four seconds.
+pub fn two_rooms(time: f64) -> Scene {
+    let mut builder = Builder::default();
+    let white = builder.material(Material::diffuse("white", [0.73; 3]));
+    let orange = builder.material(Material::diffuse("orange", [0.7, 0.4, 0.15]));
+    let wood = builder.material(Material::diffuse("wood", [0.45, 0.3, 0.2]));
+    let half_wall = 0.1f32;
+    for (name, near, far) in [
+        ("near room", -4.0 - half_wall, -half_wall),
+        ("far room", half_wall, 4.0 + half_wall),
+    ] {
+        builder.quad_strip(name, room_shell(near, far, name == "near room"), white);
+    }
+    builder.quad_strip("wall between", dividing_wall(half_wall), orange);
+    let openness = openness(time);
+    let mut door = cuboid([-0.55, 0.0, -0.04], [0.55, 2.15, -0.04 + DOOR_THICKNESS as f32]);
+    door.name = "door".into();
+    let wall_face = -f64::from(half_wall);
+    let door = builder.mesh(door, wood);
+    builder.scene.instances[door].transform = DAffine3::from_translation(DVec3::new(1.2 * openness, 0.0, wall_face));
+    builder.scene.lights.push(Light {
+        name: "bulb".into(),
+        ..Light::point(DVec3::new(-0.8, 2.4, -2.2), 20.0, [1.0, 0.9, 0.75])
+    });
+    builder.look(
+        "far room",
+        DVec3::new(1.6, 1.8, 3.8),
+        DVec3::new(-0.2, 0.4, 1.2),
+        DVec3::Y,
+        70f64.to_radians(),
+    );
+    builder.scene
+}
+
+/// How far the door of [`two_rooms`] is open, from 0 to 1.
+fn openness(time: f64) -> f64 {
+    let t = time.rem_euclid(4.0);
+    let ramp = if t < 2.0 { t } else { 4.0 - t };
+    ramp.clamp(0.0, 1.0)
+}
+
+/// Five quads of a 4 m wide, 3 m high room from z = `near` to `far`, facing inward, without its wall to the other room.
+fn room_shell(near: f32, far: f32, end_wall_is_near: bool) -> Vec<[[f32; 3]; 4]> {
+    let (l, r, t) = (-2.0, 2.0, 3.0);
+    let end = if end_wall_is_near {
+        [[l, 0.0, near], [r, 0.0, near], [r, t, near], [l, t, near]]
+    } else {
+        [[r, 0.0, far], [l, 0.0, far], [l, t, far], [r, t, far]]
+    };
+    vec![
+        [[l, 0.0, far], [r, 0.0, far], [r, 0.0, near], [l, 0.0, near]],
+        [[l, t, near], [r, t, near], [r, t, far], [l, t, far]],
+        [[l, 0.0, far], [l, 0.0, near], [l, t, near], [l, t, far]],
+        [[r, 0.0, near], [r, 0.0, far], [r, t, far], [r, t, near]],
+        end,
+    ]
+}
+
+/// Both faces of the wall between the rooms, with a doorway 0.9 m wide and 2 m high, and the doorway's jambs and lintel.
+fn dividing_wall(half: f32) -> Vec<[[f32; 3]; 4]> {
+    let (l, r, t) = (-2.0, 2.0, 3.0);
+    let (a, b, h) = (-0.45, 0.45, 2.0);
+    let mut quads = Vec::new();
+    for (x0, x1, y0, y1) in [(l, a, 0.0, t), (b, r, 0.0, t), (a, b, h, t)] {
+        quads.push([[x1, y0, -half], [x0, y0, -half], [x0, y1, -half], [x1, y1, -half]]);
+        quads.push([[x0, y0, half], [x1, y0, half], [x1, y1, half], [x0, y1, half]]);
+    }
+    quads.push([[a, 0.0, half], [a, 0.0, -half], [a, h, -half], [a, h, half]]);
+    quads.push([[b, 0.0, -half], [b, 0.0, half], [b, h, half], [b, h, -half]]);
+    quads.push([[a, h, -half], [b, h, -half], [b, h, half], [a, h, half]]);
+    quads.push([[a, 0.0, half], [b, 0.0, half], [b, 0.0, -half], [a, 0.0, -half]]);
+    quads
+}
+
+/// The measured Cornell box without its light, a hundredth of its millimetres, and the customary camera.
+fn cornell_walls(time: f64) -> Scene {
+    let mut builder = Builder::default();
+    let white = builder.material(Material::diffuse("white", [0.73; 3]));
+    let red = builder.material(Material::diffuse("red", [0.65, 0.05, 0.05]));
+    let green = builder.material(Material::diffuse("green", [0.12, 0.45, 0.15]));
+    let (w, h, d) = (5.56, 5.488, 5.592);
+    builder.quad(
+        "floor",
+        [[0.0, 0.0, 0.0], [0.0, 0.0, d], [w, 0.0, d], [w, 0.0, 0.0]],
+        white,
+    );
+    builder.quad("ceiling", [[0.0, h, 0.0], [w, h, 0.0], [w, h, d], [0.0, h, d]], white);
+    builder.quad("back wall", [[0.0, 0.0, d], [0.0, h, d], [w, h, d], [w, 0.0, d]], white);
+    builder.quad(
+        "green wall",
+        [[0.0, 0.0, 0.0], [0.0, h, 0.0], [0.0, h, d], [0.0, 0.0, d]],
+        green,
+    );
+    builder.quad("red wall", [[w, 0.0, 0.0], [w, 0.0, d], [w, h, d], [w, h, 0.0]], red);
+    let short = [[1.30, 0.65], [0.82, 2.25], [2.40, 2.72], [2.90, 1.14]];
+    let tall = [[4.23, 2.47], [2.65, 2.96], [3.14, 4.56], [4.72, 4.06]];
+    let short = builder.mesh(prism("short block", short, 1.65), white);
+    builder.mesh(prism("tall block", tall, 3.3), white);
+    let slide = 0.5 * (1.0 - (TAU * time / 4.0).cos());
+    builder.scene.instances[short].transform = DAffine3::from_translation(DVec3::new(1.2 * slide, 0.0, 0.0));
+    builder.look(
+        "camera",
+        DVec3::new(2.78, 2.73, -8.0),
+        DVec3::new(2.78, 2.73, 0.0),
+        DVec3::Y,
+        0.686_047_880_841_406_8,
+    );
+    builder.scene
+}
+
+/// Collects meshes, materials and instances.
+#[derive(Default)]
+struct Builder {
+    scene: Scene,
+}
+
+impl Builder {
+    fn material(&mut self, material: Material) -> usize {
+        self.scene.materials.push(material);
+        self.scene.materials.len() - 1
+    }
+
+    /// Adds a mesh and one instance of it; returns the instance's index.
+    fn mesh(&mut self, mesh: Mesh, material: usize) -> usize {
+        let name = mesh.name.clone();
+        self.scene.meshes.push(mesh);
+        self.scene.instances.push(Instance {
+            name,
+            ..Instance::new(self.scene.meshes.len() - 1, material)
+        });
+        self.scene.instances.len() - 1
+    }
+
+    fn quad(&mut self, name: &str, corners: [[f32; 3]; 4], material: usize) {
+        self.quad_strip(name, vec![corners], material);
+    }
+
+    fn quad_strip(&mut self, name: &str, quads: Vec<[[f32; 3]; 4]>, material: usize) {
+        let mut mesh = Mesh {
+            name: name.into(),
+            ..Mesh::default()
+        };
+        for quad in quads {
+            push_quad(&mut mesh, quad);
+        }
+        self.mesh(mesh, material);
+    }
+
+    fn look(&mut self, name: &str, from: DVec3, to: DVec3, up: DVec3, fov_y: f64) {
+        let back = (from - to).normalize();
+        let right = up.cross(back).normalize();
+        self.scene.cameras.push(Camera {
+            name: name.into(),
+            transform: DAffine3::from_cols(right, back.cross(right), back, from),
+            projection: Projection::Perspective { fov_y },
+        });
+    }
+}
+
+/// Appends a quad, counter-clockwise from the front.
+fn push_quad(mesh: &mut Mesh, corners: [[f32; 3]; 4]) {
+    let [a, b, c, _] = corners.map(Vec3::from);
+    let normal = (b - a).cross(c - a).normalize().to_array();
+    let first = mesh.positions.len() as u32;
+    mesh.positions.extend(corners);
+    mesh.normals.extend([normal; 4]);
+    mesh.tex_coords.extend([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
+    mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|i| first + i));
+}
+
+/// A vertical prism over a quadrilateral given as (x, z) corners, clockwise from above; open at the bottom.
+fn prism(name: &str, base: [[f32; 2]; 4], height: f32) -> Mesh {
+    let mut mesh = Mesh {
+        name: name.into(),
+        ..Mesh::default()
+    };
+    let at = |i: usize, y: f32| [base[i % 4][0], y, base[i % 4][1]];
+    push_quad(&mut mesh, [at(0, height), at(1, height), at(2, height), at(3, height)]);
+    for i in 0..4 {
+        push_quad(
+            &mut mesh,
+            [at(i + 1, 0.0), at(i + 1, height), at(i, height), at(i, 0.0)],
+        );
+    }
+    mesh
+}
+
+/// A closed axis-aligned box, facing outward.
+fn cuboid(min: [f32; 3], max: [f32; 3]) -> Mesh {
+    let ([x0, y0, z0], [x1, y1, z1]) = (min, max);
+    let mut mesh = Mesh::default();
+    for quad in [
+        [[x0, y0, z1], [x1, y0, z1], [x1, y1, z1], [x0, y1, z1]],
+        [[x1, y0, z0], [x0, y0, z0], [x0, y1, z0], [x1, y1, z0]],
+        [[x1, y0, z1], [x1, y0, z0], [x1, y1, z0], [x1, y1, z1]],
+        [[x0, y0, z0], [x0, y0, z1], [x0, y1, z1], [x0, y1, z0]],
+        [[x0, y1, z1], [x1, y1, z1], [x1, y1, z0], [x0, y1, z0]],
+        [[x0, y0, z0], [x1, y0, z0], [x1, y0, z1], [x0, y0, z1]],
+    ] {
+        push_quad(&mut mesh, quad);
+    }
+    mesh
+}
+
+/// A unit sphere whose triangles face inward.
+fn inward_sphere(name: &str, rings: u32, segments: u32) -> Mesh {
+    let mut mesh = Mesh {
+        name: name.into(),
+        ..Mesh::default()
+    };
+    for ring in 0..=rings {
+        let theta = PI * f64::from(ring) / f64::from(rings);
+        for segment in 0..=segments {
+            let phi = TAU * f64::from(segment) / f64::from(segments);
+            let p = DVec3::new(theta.sin() * phi.cos(), theta.cos(), theta.sin() * phi.sin()).as_vec3();
+            mesh.positions.push(p.to_array());
+            mesh.normals.push((-p).to_array());
+            mesh.tex_coords
+                .push([segment as f32 / segments as f32, ring as f32 / rings as f32]);
+        }
+    }
+    let row = segments + 1;
+    for ring in 0..rings {
+        for segment in 0..segments {
+            let a = ring * row + segment;
+            let (b, c, d) = (a + 1, a + row, a + row + 1);
+            if ring > 0 {
+                mesh.indices.extend([a, c, b]);
+            }
+            if ring + 1 < rings {
+                mesh.indices.extend([b, c, d]);
+            }
+        }
+    }
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Geometric normals of an instance's triangles with their centroids, world space.
+    fn facets(scene: &Scene, instance: usize) -> Vec<(DVec3, DVec3)> {
+        let instance = &scene.instances[instance];
+        let mesh = &scene.meshes[instance.mesh];
+        let at = |i: u32| {
+            instance
+                .transform
+                .transform_point3(Vec3::from(mesh.positions[i as usize]).as_dvec3())
+        };
+        mesh.indices
+            .chunks_exact(3)
+            .map(|t| {
+                let (a, b, c) = (at(t[0]), at(t[1]), at(t[2]));
+                ((b - a).cross(c - a).normalize(), (a + b + c) / 3.0)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn every_sample_is_valid_at_any_time() {
+        for name in NAMES {
+            for time in [0.0, 0.5, 1.0, 2.75, -1.0] {
+                by_name(name, time).unwrap().validate().unwrap();
+            }
+        }
+        assert!(by_name("teapot", 0.0).is_none());
+    }
+
+    #[test]
+    fn something_moves_in_each_sample_that_says_so() {
+        for name in ["cornell", "cornell-spot", "two-rooms"] {
+            let (a, b) = (by_name(name, 0.0).unwrap(), by_name(name, 1.0).unwrap());
+            assert!(a.instances != b.instances || a.lights != b.lights, "{name}");
+        }
+    }
+
+    #[test]
+    fn walls_face_the_inside_and_blocks_face_outward() {
+        let scene = cornell(0.0);
+        let inside = DVec3::new(2.78, 2.74, 2.8);
+        for wall in 0..5 {
+            for (normal, at) in facets(&scene, wall) {
+                assert!(normal.dot(inside - at) > 0.0, "{}", scene.instances[wall].name);
+            }
+        }
+        for block in 5..7 {
+            let all = facets(&scene, block);
+            let middle = all.iter().map(|f| f.1).sum::<DVec3>() / all.len() as f64;
+            for (normal, at) in all {
+                assert!(normal.dot(at - middle) > 0.0, "{}", scene.instances[block].name);
+            }
+        }
+        for (normal, at) in facets(&furnace(0.5, 1.0), 0) {
+            assert!(normal.dot(at) < 0.0);
+        }
+        let rooms = two_rooms(0.0);
+        for (room, inside) in [(0, DVec3::new(0.0, 1.5, -2.1)), (1, DVec3::new(0.0, 1.5, 2.1))] {
+            for (normal, at) in facets(&rooms, room) {
+                assert!(normal.dot(inside - at) > 0.0, "room {room}");
+            }
+        }
+        let door = facets(&rooms, 3);
+        let middle = door.iter().map(|f| f.1).sum::<DVec3>() / door.len() as f64;
+        for (normal, at) in door {
+            assert!(normal.dot(at - middle) > 0.0, "door");
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! What a scene holds, in the few numbers that decide which stages it needs.
+
+use super::{Scene, SceneBounds};
+use crate::Error;
+use glam::{DVec3, Vec3};
+use std::f64::consts::PI;
+
+/// Everything that the plan and the unit frame need to know of a scene. A host without a [`Scene`] fills it in by hand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SceneSummary {
+    /// The region that light should fill.
+    pub bounds: SceneBounds,
+    /// Area of all surfaces, one side counted, world units squared.
+    pub area: f64,
+    /// Triangles over all instances.
+    pub triangles: usize,
+    /// Flux of all lights and emitting surfaces, W, summed over channels.
+    pub total_flux: f64,
+    /// Lights without geometry.
+    pub lights: usize,
+    /// Lights with an extent, hence a penumbra.
+    pub lights_with_extent: usize,
+    /// Whether any surface reflects light at all.
+    pub has_reflecting_surfaces: bool,
+    /// Names of emitting materials in use.
+    pub emissive: Vec<String>,
+    /// Names of metals in use.
+    pub metals: Vec<String>,
+    /// Names of transmitting materials in use.
+    pub dielectrics: Vec<String>,
+}
+
+impl SceneSummary {
+    /// Reads it off a scene.
+    ///
+    /// # Errors
+    /// As [`Scene::bounds`].
+    pub fn of(scene: &Scene) -> Result<Self, Error> {
+        let bounds = scene.bounds()?;
+        let mut area = 0.0;
+        let mut total_flux = 0.0;
+        let mut used = vec![false; scene.materials.len()];
+        for instance in &scene.instances {
+            used[instance.material] = true;
+            let own_area = instance_area(scene, instance);
+            area += own_area;
+            let emission = Vec3::from(scene.materials[instance.material].emission).as_dvec3();
+            total_flux += emission.element_sum() * PI * own_area;
+        }
+        for light in &scene.lights {
+            total_flux += light.flux(bounds.radius()).element_sum();
+        }
+        let names = |wanted: fn(&super::Material) -> bool| {
+            let in_use = scene
+                .materials
+                .iter()
+                .enumerate()
+                .filter(|(i, m)| used[*i] && wanted(m));
+            in_use
+                .map(|(i, m)| super::name_or_index(&m.name, i))
+                .collect::<Vec<_>>()
+        };
+        Ok(Self {
+            bounds,
+            area,
+            triangles: scene.triangle_count(),
+            total_flux,
+            lights: scene.lights.len(),
+            lights_with_extent: scene.lights.iter().filter(|l| l.has_extent()).count(),
+            has_reflecting_surfaces: !names(|m| m.base_color.iter().any(|&c| c > 0.0)).is_empty(),
+            emissive: names(super::Material::is_emissive),
+            metals: names(super::Material::is_metal),
+            dielectrics: names(super::Material::is_transmissive),
+        })
+    }
+}
+
+fn instance_area(scene: &Scene, instance: &super::Instance) -> f64 {
+    let mesh = &scene.meshes[instance.mesh];
+    let corner = |i: u32| -> DVec3 {
+        let p = Vec3::from(mesh.positions[i as usize]).as_dvec3();
+        instance.transform.transform_point3(p)
+    };
+    mesh.indices
+        .chunks_exact(3)
+        .map(|t| {
+            let (a, b, c) = (corner(t[0]), corner(t[1]), corner(t[2]));
+            0.5 * (b - a).cross(c - a).length()
+        })
+        .sum()
+}
