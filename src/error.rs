@@ -98,6 +98,12 @@ pub enum Error {
         /// How many there are.
         found: usize,
     },
+    /// A reference image is of no use to compare with.
+    #[error("the reference image {problem}")]
+    InvalidReference {
+        /// What is wrong with it.
+        problem: String,
+    },
     /// A read-back failed: the device was lost, or the buffer could not be mapped.
     #[error("reading {what} back from the device failed: {reason}")]
     ReadBack {

@@ -1,0 +1,90 @@
+// Twin of `resource::lights::gpu::LightRecord`, and how a light's shadow-map layers are addressed.
+
+const LIGHT_POINT: u32 = 0u;
+const LIGHT_SPOT: u32 = 1u;
+const LIGHT_DIRECTIONAL: u32 = 2u;
+
+struct Light {
+    position: vec3f,
+    kind: u32,
+    // Unit axis along which the light looks
+    direction: vec3f,
+    // 1 - cos of the spot's inner half angle
+    inner: f32,
+    // Radiant intensity, or irradiance on a perpendicular plane (directional)
+    intensity: vec3f,
+    // 1 - cos of the spot's outer half angle
+    outer: f32,
+    right: vec3f,
+    first_layer: u32,
+    up: vec3f,
+    layer_count: u32,
+    photon_flux: vec3f,
+    // Tangent of the single layer's half angle, or its half width (directional)
+    half_extent: f32,
+    first_photon: u32,
+    photon_count: u32,
+    // 1 / solid angle of full intensity (point, spot), or 1 / area of the disc (directional)
+    density: f32,
+    disc_radius: f32,
+}
+
+// A ray of light: where it starts, its unit direction, and the layer and place where the shadow map holds it.
+struct LightRay {
+    origin: vec3f,
+    direction: vec3f,
+    layer: u32,
+    uv: vec2f,
+}
+
+fn light_layer_uv(x: f32, y: f32) -> vec2f {
+    return vec2f(0.5 + 0.5 * x, 0.5 - 0.5 * y);
+}
+
+// The ray along a direction from the light; `offset` is where it crosses the disc of parallel rays, (right, up).
+fn light_ray(light: Light, direction: vec3f, offset: vec2f) -> LightRay {
+    if light.kind == LIGHT_DIRECTIONAL {
+        let origin = light.right * offset.x + light.up * offset.y - SURFACE_TEXEL_PARALLEL_START * light.direction;
+        let uv = light_layer_uv(offset.x / light.half_extent, offset.y / light.half_extent);
+        return LightRay(origin, light.direction, light.first_layer, uv);
+    }
+    if light.layer_count == 1u {
+        let scale = 1.0 / (dot(direction, light.direction) * light.half_extent);
+        let uv = light_layer_uv(dot(direction, light.right) * scale, dot(direction, light.up) * scale);
+        return LightRay(light.position, direction, light.first_layer, uv);
+    }
+    let face = cube_face_of(direction);
+    return LightRay(light.position, direction, light.first_layer + face, cube_face_uv(face, direction));
+}
+
+// The ray of light that would reach a point.
+fn light_ray_to(light: Light, p: vec3f) -> LightRay {
+    if light.kind == LIGHT_DIRECTIONAL {
+        return light_ray(light, light.direction, vec2f(dot(p, light.right), dot(p, light.up)));
+    }
+    return light_ray(light, normalize(p - light.position), vec2f(0.0));
+}
+
+// The ray through a texel's centre, near which `ray` passes.
+fn light_texel_ray(light: Light, ray: LightRay, texel: vec2u, size: u32) -> LightRay {
+    let uv = (vec2f(texel) + 0.5) / f32(size);
+    let x = (2.0 * uv.x - 1.0) * light.half_extent;
+    let y = (1.0 - 2.0 * uv.y) * light.half_extent;
+    if light.kind == LIGHT_DIRECTIONAL {
+        return light_ray(light, light.direction, vec2f(x, y));
+    }
+    var direction = light.direction + x * light.right + y * light.up;
+    if light.layer_count != 1u {
+        direction = cube_face_direction(ray.layer - light.first_layer, uv);
+    }
+    return LightRay(light.position, normalize(direction), ray.layer, uv);
+}
+
+// Distance along `ray` to the plane of the surface that the texel around `texel_ray` holds. A plane seen at a grazing
+// angle could lie anywhere, so the answer stays within a factor of two of the texel's own distance.
+fn light_texel_distance(ray: LightRay, texel_ray: LightRay, texel: SurfaceTexel) -> f32 {
+    let toward = dot(texel.normal, ray.direction);
+    let offset = texel_ray.origin + texel_ray.direction * texel.distance - ray.origin;
+    let distance = dot(texel.normal, offset) / min(toward, -1e-6);
+    return clamp(distance, 0.5 * texel.distance, 2.0 * texel.distance);
+}

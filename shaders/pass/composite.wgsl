@@ -1,0 +1,32 @@
+// Outgoing radiance: emitted + reflectance / pi * (direct + indirect irradiance), scaled back to world units.
+
+struct Params {
+    // Radiance per unit-frame radiance, times pre-exposure
+    output_scale: f32,
+    direct_weight: f32,
+    indirect_weight: f32,
+    emission_weight: f32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> view: View;
+@group(0) @binding(2) var base_color_texture: texture_2d<f32>;
+@group(0) @binding(3) var emission_texture: texture_2d<f32>;
+@group(0) @binding(4) var direct_irradiance: texture_2d<f32>;
+@group(0) @binding(5) var indirect_irradiance: texture_2d<f32>;
+
+const INVERSE_PI: f32 = 0.318309886;
+
+@fragment
+fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
+    let at = vec2u(position.xy);
+    let pixel = at + view.origin;
+    let base_color = textureLoad(base_color_texture, pixel, 0);
+    if base_color.a <= 0.0 {
+        return vec4f(0.0);
+    }
+    let direct = textureLoad(direct_irradiance, at, 0).rgb * params.direct_weight;
+    let indirect = textureLoad(indirect_irradiance, at, 0).rgb * params.indirect_weight;
+    let emission = textureLoad(emission_texture, pixel, 0).rgb * params.emission_weight;
+    return vec4f((emission + base_color.rgb * INVERSE_PI * (direct + indirect)) * params.output_scale, 1.0);
+}

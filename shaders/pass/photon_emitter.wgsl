@@ -1,0 +1,82 @@
+// Emits photons from every light and finds where they first land, in the light's reflective shadow map.
+
+struct Params {
+    photon_count: u32,
+    light_count: u32,
+    sample_offset: u32,
+    shadow_map_size: u32,
+    row: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> lights: array<Light>;
+@group(0) @binding(2) var shadow_maps: texture_2d_array<u32>;
+@group(0) @binding(3) var<storage, read_write> photons: array<Photon>;
+
+struct Emission {
+    ray: LightRay,
+    // Per solid angle, or per perpendicular area (directional)
+    pdf: f32,
+}
+
+fn emit(light: Light, sequence_index: u32) -> Emission {
+    let u = random_pair(sequence_index, 0u);
+    switch light.kind {
+        case LIGHT_DIRECTIONAL: {
+            let offset = light.disc_radius * sampling_disc(u);
+            return Emission(light_ray(light, light.direction, offset), light.density);
+        }
+        case LIGHT_SPOT: {
+            let local = sampling_spot(u, light.inner, light.outer);
+            let direction = mat3x3f(light.right, light.up, light.direction) * local;
+            let falloff = sampling_spot_falloff(1.0 - local.z, light.inner, light.outer);
+            return Emission(light_ray(light, normalize(direction), vec2f(0.0)), light.density * falloff);
+        }
+        default: {
+            return Emission(light_ray(light, sampling_sphere(u), vec2f(0.0)), light.density);
+        }
+    }
+}
+
+fn light_of(photon: u32) -> u32 {
+    var index = 0u;
+    while index + 1u < params.light_count && photon >= lights[index].first_photon + lights[index].photon_count {
+        index++;
+    }
+    return index;
+}
+
+@compute @workgroup_size(64)
+fn emit_photons(@builtin(global_invocation_id) id: vec3u) {
+    let index = id.y * params.row + id.x;
+    if id.x >= params.row || index >= params.photon_count {
+        return;
+    }
+    let light_index = light_of(index);
+    let light = lights[light_index];
+    if index < light.first_photon || index >= light.first_photon + light.photon_count {
+        photons[index] = photon_gone(PHOTON_EMPTY, vec3f(0.0), vec3f(0.0, 0.0, 1.0), 0u);
+        return;
+    }
+    let emission = emit(light, params.sample_offset + index);
+    let ray = emission.ray;
+    let at = cube_face_texel(ray.uv, params.shadow_map_size);
+    let texel = surface_texel_unpack(textureLoad(shadow_maps, at, ray.layer, 0));
+    if texel.distance <= 0.0 {
+        photons[index] = photon_gone(PHOTON_ESCAPED, light.photon_flux, ray.direction, light_index);
+        return;
+    }
+    let distance = light_texel_distance(ray, light_texel_ray(light, ray, at, params.shadow_map_size), texel);
+    let cosine = abs(dot(texel.normal, ray.direction));
+    let spread = select(1.0 / (distance * distance), 1.0, light.kind == LIGHT_DIRECTIONAL);
+    photons[index] = Photon(
+        ray.origin + distance * ray.direction,
+        PHOTON_STORED | PHOTON_FIRST_HIT,
+        light.photon_flux,
+        emission.pdf * cosine * spread,
+        octahedral_pack(texel.normal),
+        octahedral_pack(ray.direction),
+        reflectance_pack(texel.reflectance),
+        light_index,
+    );
+}

@@ -1,0 +1,70 @@
+// What a photon gives to a surface point: shared by the tiled gather and by quads.
+//   E(x) = sum over photons of flux * K(|x - x_p| / h) / h^2,  K integrates to 1 over the unit disc.
+
+// 0: constant, 1: cone, 2: Epanechnikov
+override kernel: u32 = 2u;
+
+const SPLAT_INVERSE_PI: f32 = 0.318309886;
+// Cosine of the largest angle between the photon's and the receiver's normal.
+const SPLAT_NORMAL_AGREEMENT: f32 = 0.7;
+// The slab around the photon's plane that receives it, as a share of the bandwidth: admits gentle curvature.
+const SPLAT_SLAB: f32 = 0.25;
+// And at least this thick, unit frame: depth and photon positions are f32.
+const SPLAT_SLAB_FLOOR: f32 = 0x1p-11;
+
+struct Bandwidth {
+    // h = scale / sqrt(p), p = density / uniform density clamped to [lowest, highest]; scale alone if highest is 0
+    scale: f32,
+    uniform_density: f32,
+    lowest: f32,
+    highest: f32,
+}
+
+// K at squared relative distance q in [0, 1].
+fn splat_kernel(q: f32) -> f32 {
+    switch kernel {
+        case 0u: { return SPLAT_INVERSE_PI; }
+        case 1u: { return 3.0 * SPLAT_INVERSE_PI * (1.0 - sqrt(q)); }
+        default: { return 2.0 * SPLAT_INVERSE_PI * (1.0 - q); }
+    }
+}
+
+// Radius of a photon's kernel, unit frame (Yao et al. 2010, section 6, made dimensionless by area and pdf).
+fn splat_bandwidth(b: Bandwidth, density: f32) -> f32 {
+    if b.highest <= 0.0 {
+        return b.scale;
+    }
+    return b.scale * inverseSqrt(clamp(density / b.uniform_density, b.lowest, b.highest));
+}
+
+// Weight, 1/area, of a photon at x_p, normal n_p, radius h, for a receiver at x with geometric normal n.
+fn splat_weight(x: vec3f, n: vec3f, x_p: vec3f, n_p: vec3f, h: f32) -> f32 {
+    let d = x - x_p;
+    let q = dot(d, d) / (h * h);
+    let in_slab = abs(dot(d, n_p)) <= SPLAT_SLAB * h + SPLAT_SLAB_FLOOR;
+    if q >= 1.0 || !in_slab || dot(n, n_p) < SPLAT_NORMAL_AGREEMENT {
+        return 0.0;
+    }
+    return splat_kernel(q) / (h * h);
+}
+
+fn splat_position(view: View, pixel: vec2i) -> vec3f {
+    let at = vec2u(pixel) + view.origin;
+    return g_buffer_position(view, vec2f(pixel), textureLoad(depth_texture, at, 0).r);
+}
+
+// Geometric normal at a pixel: from depth where the nearer neighbours lie on one surface, else the shading normal.
+fn splat_receiver_normal(view: View, pixel: vec2i, p: vec3f, shading: vec3f) -> vec3f {
+    let limit = vec2i(view.size) - 1;
+    let x0 = p - splat_position(view, vec2i(max(pixel.x - 1, 0), pixel.y));
+    let x1 = splat_position(view, vec2i(min(pixel.x + 1, limit.x), pixel.y)) - p;
+    let y0 = p - splat_position(view, vec2i(pixel.x, max(pixel.y - 1, 0)));
+    let y1 = splat_position(view, vec2i(pixel.x, min(pixel.y + 1, limit.y))) - p;
+    let use_x1 = pixel.x == 0 || (pixel.x < limit.x && dot(x1, x1) < dot(x0, x0));
+    let use_y1 = pixel.y == 0 || (pixel.y < limit.y && dot(y1, y1) < dot(y0, y0));
+    let n = cross(select(x0, x1, use_x1), select(y0, y1, use_y1));
+    let length_squared = dot(n, n);
+    let unit = n * inverseSqrt(max(length_squared, 0x1p-126));
+    let facing = select(-unit, unit, dot(unit, shading) > 0.0);
+    return select(shading, facing, length_squared > 0x1p-120 && dot(facing, shading) > SPLAT_NORMAL_AGREEMENT);
+}

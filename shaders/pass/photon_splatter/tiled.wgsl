@@ -1,0 +1,260 @@
+// Density estimation by tiles: photons are projected, binned to screen tiles, and each pixel gathers its tile's list.
+//
+// Lists fill in arrival order, so sums are taken in integers, which do not care: each contribution is rounded to a
+// multiple of 2^-30 of an upper bound of the tile's brightest contribution and added in 64 bits. Two lights of very
+// different power share a tile without loss, and the same frame gives the same bits.
+
+struct Params {
+    // Slots of the photon buffer to read: from, how many
+    first_slot: u32,
+    slot_count: u32,
+    tile_columns: u32,
+    tile_rows: u32,
+    row: u32,
+    // Largest radius in pixels
+    max_radius: f32,
+    // Capacity of the tile lists
+    capacity: u32,
+    bandwidth: Bandwidth,
+}
+
+struct Splat {
+    position: vec3f,
+    radius: f32,
+    flux: vec3f,
+    normal: u32,
+}
+
+struct Tile {
+    count: atomic<u32>,
+    first: u32,
+    filled: atomic<u32>,
+    // f32 bits: positive floats order as integers do
+    brightest: atomic<u32>,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> view: View;
+@group(0) @binding(2) var<storage, read> photons: array<Photon>;
+@group(0) @binding(3) var<storage, read_write> splats: array<Splat>;
+// Tile rectangle of a splat: column, row (12 bits each), columns, rows (4 bits each); 0: none
+@group(0) @binding(4) var<storage, read_write> rectangles: array<u32>;
+@group(0) @binding(5) var<storage, read_write> tiles: array<Tile>;
+@group(0) @binding(6) var<storage, read_write> list: array<u32>;
+@group(0) @binding(7) var depth_texture: texture_2d<f32>;
+@group(0) @binding(8) var normal_texture: texture_2d<f32>;
+@group(0) @binding(9) var base_color_texture: texture_2d<f32>;
+@group(0) @binding(10) var irradiance: texture_storage_2d<rgba32float, write>;
+
+// Twin of `TILE`.
+const TILE: u32 = 16u;
+// A splat may touch this many tiles a side; its radius shrinks until it does. Twin of `TILES_A_SIDE`.
+const TILES_A_SIDE: i32 = 4;
+
+fn matrix_row(i: u32) -> vec4f {
+    let m = view.view_projection;
+    return vec4f(m[0][i], m[1][i], m[2][i], m[3][i]);
+}
+
+// Range of a normalised device coordinate over the ball (c, h): the planes (row - t w) through the eye that touch it,
+//     (a - t w)^2 = h^2 |A - t W|^2,  a = row.(c,1), w = w_row.(c,1), A and W the rows' linear parts.
+fn projected_range(row: vec4f, w_row: vec4f, c: vec3f, h: f32) -> vec2f {
+    let a = dot(row, vec4f(c, 1.0));
+    let w = dot(w_row, vec4f(c, 1.0));
+    let h2 = h * h;
+    let qa = w * w - h2 * dot(w_row.xyz, w_row.xyz);
+    let qb = a * w - h2 * dot(row.xyz, w_row.xyz);
+    let qc = a * a - h2 * dot(row.xyz, row.xyz);
+    let root = sqrt(max(0.0, qb * qb - qa * qc));
+    return vec2f(qb - root, qb + root) / qa;
+}
+
+// First and last tile that the ball touches: x0, y0, x1, y1; x1 < x0 where it touches none.
+fn tile_range(c: vec3f, h: f32) -> vec4i {
+    let x = projected_range(matrix_row(0u), matrix_row(3u), c, h);
+    let y = projected_range(matrix_row(1u), matrix_row(3u), c, h);
+    let size = vec2f(view.size);
+    // Half a pixel of slack for rounding: a tile too many costs nothing but time.
+    let low = vec2f(0.5 + 0.5 * x.x, 0.5 - 0.5 * y.y) * size - 0.5;
+    let high = vec2f(0.5 + 0.5 * x.y, 0.5 - 0.5 * y.x) * size + 0.5;
+    let tiles_in_all = vec2f(f32(params.tile_columns), f32(params.tile_rows));
+    let first_tile = clamp(floor(low / f32(TILE)), vec2f(0.0), tiles_in_all);
+    let last_tile = clamp(floor(high / f32(TILE)), vec2f(-1.0), tiles_in_all - 1.0);
+    return vec4i(vec4f(first_tile, last_tile));
+}
+
+// Largest radius at a point whose kernel covers `max_radius` pixels; 0 behind the eye.
+fn radius_limit(p: vec3f) -> f32 {
+    let w = dot(matrix_row(3u), vec4f(p, 1.0));
+    let x_scale = length(matrix_row(0u).xyz) * f32(view.size.x);
+    let y_scale = length(matrix_row(1u).xyz) * f32(view.size.y);
+    return max(0.0, params.max_radius * w / (0.5 * max(x_scale, y_scale)));
+}
+
+fn slot_of(id: vec3u) -> u32 {
+    return select(id.y * params.row + id.x, 0xffffffffu, id.x >= params.row);
+}
+
+// Photons to splats, and how many of them each tile holds.
+@compute @workgroup_size(64)
+fn project_photons(@builtin(global_invocation_id) id: vec3u) {
+    let index = slot_of(id);
+    if index >= params.slot_count {
+        return;
+    }
+    rectangles[index] = 0u;
+    let photon = photons[params.first_slot + index];
+    if (photon.state & (PHOTON_STATE_MASK | PHOTON_FIRST_HIT)) != PHOTON_STORED {
+        return;
+    }
+    var h = min(splat_bandwidth(params.bandwidth, photon.density), radius_limit(photon.position));
+    if !(h > 0.0) {
+        return;
+    }
+    var range = tile_range(photon.position, h);
+    for (var i = 0u; i < 8u && any(range.zw - range.xy >= vec2i(TILES_A_SIDE)); i++) {
+        h *= 0.75;
+        range = tile_range(photon.position, h);
+    }
+    range = vec4i(range.xy, min(range.zw, range.xy + TILES_A_SIDE - 1));
+    if any(range.zw < range.xy) {
+        return;
+    }
+    splats[index] = Splat(photon.position, h, photon.flux, photon.normal);
+    let extent = vec2u(range.zw - range.xy + 1);
+    rectangles[index] = u32(range.x) | (u32(range.y) << 12u) | (extent.x << 24u) | (extent.y << 28u);
+    let peak = max(photon.flux.x, max(photon.flux.y, photon.flux.z)) * splat_kernel(0.0) / (h * h);
+    for (var y = range.y; y <= range.w; y++) {
+        for (var x = range.x; x <= range.z; x++) {
+            let tile = u32(y) * params.tile_columns + u32(x);
+            atomicAdd(&tiles[tile].count, 1u);
+            atomicMax(&tiles[tile].brightest, bitcast<u32>(peak));
+        }
+    }
+}
+
+var<workgroup> scan_sums: array<u32, 256>;
+
+// Where each tile's list starts: an exclusive sum over the counts, 256 tiles at a time.
+@compute @workgroup_size(256)
+fn scan_tiles(@builtin(local_invocation_index) lane: u32) {
+    let tile_count = params.tile_columns * params.tile_rows;
+    var base = 0u;
+    for (var start = 0u; start < tile_count; start += 256u) {
+        let tile = start + lane;
+        var count = 0u;
+        if tile < tile_count {
+            count = atomicLoad(&tiles[tile].count);
+        }
+        scan_sums[lane] = count;
+        workgroupBarrier();
+        for (var step = 1u; step < 256u; step *= 2u) {
+            var left = 0u;
+            if lane >= step {
+                left = scan_sums[lane - step];
+            }
+            workgroupBarrier();
+            scan_sums[lane] += left;
+            workgroupBarrier();
+        }
+        if tile < tile_count {
+            tiles[tile].first = base + scan_sums[lane] - count;
+        }
+        base += scan_sums[255];
+        workgroupBarrier();
+    }
+}
+
+// Splats into the lists of their tiles.
+@compute @workgroup_size(64)
+fn bin_splats(@builtin(global_invocation_id) id: vec3u) {
+    let index = slot_of(id);
+    if index >= params.slot_count {
+        return;
+    }
+    let rectangle = rectangles[index];
+    let corner = vec2u(rectangle & 4095u, (rectangle >> 12u) & 4095u);
+    let extent = vec2u((rectangle >> 24u) & 15u, rectangle >> 28u);
+    for (var y = 0u; y < extent.y; y++) {
+        for (var x = 0u; x < extent.x; x++) {
+            let tile = (corner.y + y) * params.tile_columns + corner.x + x;
+            let at = tiles[tile].first + atomicAdd(&tiles[tile].filled, 1u);
+            if at < params.capacity {
+                list[at] = index;
+            }
+        }
+    }
+}
+
+// Unsigned 64-bit numbers, low word first.
+fn add_64(sum: vec2u, value: u32) -> vec2u {
+    let low = sum.x + value;
+    return vec2u(low, sum.y + select(0u, 1u, low < value));
+}
+
+fn f32_from_64(sum: vec2u) -> f32 {
+    return f32(sum.y) * 0x1p32 + f32(sum.x);
+}
+
+// 2^e, for e within the exponents of normal floats.
+fn power_of_two(e: i32) -> f32 {
+    return bitcast<f32>(u32(clamp(e, -126, 127) + 127) << 23u);
+}
+
+var<workgroup> batch: array<Splat, 256>;
+// First, count and brightest of the workgroup's tile
+var<workgroup> tile_list: vec3u;
+
+@compute @workgroup_size(16, 16)
+fn gather_tiles(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let tile = group.y * params.tile_columns + group.x;
+    if lane == 0u {
+        tile_list = vec3u(tiles[tile].first, atomicLoad(&tiles[tile].count), atomicLoad(&tiles[tile].brightest));
+    }
+    let listed = workgroupUniformLoad(&tile_list);
+    // The bound is below 2^(exponent + 1), so a contribution is below 2^31 quanta.
+    let exponent = i32(listed.z >> 23u) - 127;
+    let to_quanta = power_of_two(30 - exponent);
+
+    let inside = all(id.xy < view.size);
+    let pixel = min(id.xy, view.size - 1u);
+    let at = pixel + view.origin;
+    let seen = inside && textureLoad(base_color_texture, at, 0).a > 0.0;
+    let p = splat_position(view, vec2i(pixel));
+    let shading = g_buffer_normal(view, textureLoad(normal_texture, at, 0));
+    let n = splat_receiver_normal(view, vec2i(pixel), p, shading);
+
+    var red = vec2u(0u);
+    var green = vec2u(0u);
+    var blue = vec2u(0u);
+    for (var start = 0u; start < listed.y; start += 256u) {
+        let batch_length = min(256u, listed.y - start);
+        if lane < batch_length {
+            batch[lane] = splats[list[listed.x + start + lane]];
+        }
+        workgroupBarrier();
+        if seen {
+            for (var i = 0u; i < batch_length; i++) {
+                let d = p - batch[i].position;
+                // The cheap test first: most splats of a tile miss a given pixel.
+                if dot(d, d) < batch[i].radius * batch[i].radius {
+                    let splat = batch[i];
+                    let weight = splat_weight(p, n, splat.position, octahedral_unpack(splat.normal), splat.radius);
+                    let quanta = vec3u(round(splat.flux * weight * to_quanta));
+                    red = add_64(red, quanta.x);
+                    green = add_64(green, quanta.y);
+                    blue = add_64(blue, quanta.z);
+                }
+            }
+        }
+        workgroupBarrier();
+    }
+    if inside {
+        let sum = vec3f(f32_from_64(red), f32_from_64(green), f32_from_64(blue));
+        textureStore(irradiance, id.xy, vec4f(sum * power_of_two(exponent - 30), select(0.0, 1.0, seen)));
+    }
+}

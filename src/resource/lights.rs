@@ -1,0 +1,218 @@
+//! The lights of a frame as the GPU sees them, and how many photons each of them emits.
+
+use super::ShadowMaps;
+use super::view::axes_along;
+use crate::scene::{Light, LightKind, UnitFrame};
+use crate::{Error, gpu as device};
+use glam::{DVec3, Vec3};
+
+/// Most lights a scene may have.
+pub const MAX_LIGHTS: usize = 64;
+
+/// Share of the photon budget that is spread evenly, so that a dim lamp in a dark corner is not starved; the rest goes
+/// by flux.
+const EVEN_SHARE: f64 = 0.25;
+
+pub(crate) mod gpu {
+    use bytemuck::{Pod, Zeroable};
+
+    /// Twin of `Light` in `shaders/common/light.wgsl`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct LightRecord {
+        pub(crate) position: [f32; 3],
+        pub(crate) kind: u32,
+        pub(crate) direction: [f32; 3],
+        pub(crate) inner: f32,
+        pub(crate) intensity: [f32; 3],
+        pub(crate) outer: f32,
+        pub(crate) right: [f32; 3],
+        pub(crate) first_layer: u32,
+        pub(crate) up: [f32; 3],
+        pub(crate) layer_count: u32,
+        pub(crate) photon_flux: [f32; 3],
+        pub(crate) half_extent: f32,
+        pub(crate) first_photon: u32,
+        pub(crate) photon_count: u32,
+        pub(crate) density: f32,
+        pub(crate) disc_radius: f32,
+    }
+}
+
+/// All lights of a frame: an `array<Light>` of `shaders/common/light.wgsl`, intensities in the unit frame.
+#[derive(Debug)]
+pub struct Lights {
+    buffer: wgpu::Buffer,
+    written: Vec<gpu::LightRecord>,
+    bytes: u64,
+}
+
+impl Lights {
+    /// Room for [`MAX_LIGHTS`].
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] if the device grants next to nothing.
+    pub fn new(gpu: &wgpu::Device) -> Result<Self, Error> {
+        let bytes = (MAX_LIGHTS * size_of::<gpu::LightRecord>()) as u64;
+        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        Ok(Self {
+            buffer: device::buffer(gpu, "lightfall::Lights", bytes, usage)?,
+            written: Vec::new(),
+            bytes,
+        })
+    }
+
+    /// Uploads the lights of this frame. `photon_count` photons are divided among them: three quarters in proportion to
+    /// flux, one quarter evenly among those that shine. Shadow-map layers are numbered as [`ShadowMaps`] does.
+    ///
+    /// # Errors
+    /// [`Error::CountMismatch`] above [`MAX_LIGHTS`].
+    pub fn write(
+        &mut self,
+        queue: &wgpu::Queue,
+        frame: &UnitFrame,
+        lights: &[Light],
+        photon_count: u32,
+    ) -> Result<(), Error> {
+        if lights.len() > MAX_LIGHTS {
+            return Err(Error::CountMismatch {
+                what: "lights (most a scene may have)",
+                expected: MAX_LIGHTS,
+                found: lights.len(),
+            });
+        }
+        let counts = divide_photons(frame, lights, photon_count);
+        let mut records = Vec::with_capacity(lights.len());
+        let (mut first_layer, mut first_photon) = (0, 0);
+        for (light, &count) in lights.iter().zip(&counts) {
+            let record = record(frame, light, first_layer, first_photon, count);
+            first_layer += record.layer_count;
+            first_photon += count;
+            records.push(record);
+        }
+        if records != self.written {
+            queue.write_buffer(&self.buffer, 0, bytemuck::cast_slice(&records));
+            self.written = records;
+        }
+        Ok(())
+    }
+
+    /// The records.
+    pub fn buffer(&self) -> &wgpu::Buffer {
+        &self.buffer
+    }
+
+    /// Lights written.
+    pub fn count(&self) -> u32 {
+        self.written.len() as u32
+    }
+
+    /// Photons that the lights written emit in all.
+    pub fn photon_count(&self) -> u32 {
+        self.written.iter().map(|l| l.photon_count).sum()
+    }
+
+    /// Bytes this resource allocated.
+    pub fn memory_use(&self) -> u64 {
+        self.bytes
+    }
+}
+
+/// Photons per light; sums to `total` if any light shines, and each light that shines gets at least one while the
+/// budget lasts.
+fn divide_photons(frame: &UnitFrame, lights: &[Light], total: u32) -> Vec<u32> {
+    let region_radius = f64::from(frame.radius()) * frame.length_scale();
+    let flux: Vec<f64> = lights.iter().map(|l| l.flux(region_radius).element_sum()).collect();
+    let all: f64 = flux.iter().sum();
+    let shining = flux.iter().filter(|&&f| f > 0.0).count() as f64;
+    let mut share_so_far = 0.0;
+    let mut given = 0;
+    flux.iter()
+        .map(|&f| {
+            if f > 0.0 {
+                share_so_far += (1.0 - EVEN_SHARE) * f / all + EVEN_SHARE / shining;
+            }
+            // Rounding the running sum, not each share, makes the parts add up.
+            let until = (share_so_far * f64::from(total)).round().min(f64::from(total)) as u32;
+            let count = until - given;
+            given = until;
+            count
+        })
+        .collect()
+}
+
+fn record(frame: &UnitFrame, light: &Light, first_layer: u32, first_photon: u32, count: u32) -> gpu::LightRecord {
+    let region_radius = f64::from(frame.radius()) * frame.length_scale();
+    let photon_flux = light.flux(region_radius) / f64::from(count.max(1));
+    let shape = ShadowMaps::light_shape(frame, light);
+    let axes = axes_along(shape.direction);
+    let (mut inner, mut outer, mut kind) = (2.0, 2.0, 0);
+    let (mut position, mut intensity) = (Vec3::ZERO, frame.intensity(light.strength()));
+    let mut density = 1.0 / light.effective_solid_angle().max(f64::MIN_POSITIVE);
+    match light.kind {
+        LightKind::Point { position: p, .. } => position = frame.point(p),
+        LightKind::Spot {
+            position: p,
+            inner_angle,
+            outer_angle,
+            ..
+        } => {
+            kind = 1;
+            position = frame.point(p);
+            inner = crate::scene::one_minus_cos(inner_angle);
+            outer = crate::scene::one_minus_cos(outer_angle);
+        }
+        LightKind::Directional { .. } => {
+            kind = 2;
+            intensity = frame.radiance(light.strength());
+            let radius = f64::from(frame.radius());
+            density = 1.0 / (std::f64::consts::PI * radius * radius);
+        }
+    }
+    gpu::LightRecord {
+        position: position.to_array(),
+        kind,
+        direction: axes.forward.to_array(),
+        inner: inner as f32,
+        intensity: intensity.to_array(),
+        outer: outer as f32,
+        right: axes.right.to_array(),
+        first_layer,
+        up: axes.up.to_array(),
+        layer_count: shape.layers,
+        photon_flux: frame.intensity(photon_flux).to_array(),
+        half_extent: shape.half_extent,
+        first_photon,
+        photon_count: count,
+        density: density as f32,
+        disc_radius: frame.radius(),
+    }
+}
+
+/// How a light looks at the scene: along which axis, how wide, with how many layers.
+pub(super) struct LightShape {
+    pub(super) direction: DVec3,
+    /// Tangent of the half angle, or half the width of parallel rays, unit frame; 1 for cubes.
+    pub(super) half_extent: f32,
+    /// 6 for a cube, else 1.
+    pub(super) layers: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SceneBounds;
+
+    fn frame() -> UnitFrame {
+        UnitFrame::new(&SceneBounds::new(DVec3::splat(-1.0), DVec3::splat(1.0)).unwrap(), 1.0).unwrap()
+    }
+
+    #[test]
+    fn photons_are_divided_by_flux_with_a_quarter_shared_evenly() {
+        let light = |i| Light::point(DVec3::ZERO, i, [1.0; 3]);
+        let counts = divide_photons(&frame(), &[light(1.0), light(3.0), light(0.0)], 1000);
+        assert_eq!(counts, [313, 687, 0]);
+        assert_eq!(counts.iter().sum::<u32>(), 1000);
+        assert_eq!(divide_photons(&frame(), &[light(0.0)], 1000), [0]);
+    }
+}

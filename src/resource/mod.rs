@@ -1,0 +1,81 @@
+//! Layer 2: what crosses a seam between passes, as plain wgpu textures and buffers of documented format.
+//!
+//! A host may make, or take, any of these at any seam. Everything is in the unit frame
+//! ([`UnitFrame`](crate::scene::UnitFrame)) unless its documentation says otherwise.
+
+pub mod cube_face;
+mod env_maps;
+mod g_buffer;
+mod geometry;
+mod irradiance;
+mod lights;
+mod mesh_geometry;
+mod photons;
+mod radiance;
+mod shadow_maps;
+mod view;
+
+pub use env_maps::EnvMaps;
+pub use g_buffer::{GBuffer, GBufferViews, NormalEncoding};
+pub use geometry::{CaptureTargets, Geometry, PrepareContext};
+pub use irradiance::Irradiance;
+pub use lights::{Lights, MAX_LIGHTS};
+pub use mesh_geometry::MeshGeometry;
+pub use photons::{PHOTON_BYTES, Photon, PhotonState, Photons};
+pub use radiance::Radiance;
+pub use shadow_maps::ShadowMaps;
+pub use view::{CameraView, CaptureMask, CapturePurpose, CaptureView};
+
+pub(crate) use g_buffer::gpu::ViewUniform;
+
+use crate::Error;
+
+/// Checks one property of a host-made view.
+fn expect<T: PartialEq + std::fmt::Debug>(
+    resource: &'static str,
+    property: &'static str,
+    found: T,
+    accepted: &[T],
+) -> Result<(), Error> {
+    if accepted.contains(&found) {
+        return Ok(());
+    }
+    let expected = accepted.iter().map(|a| format!("{a:?}")).collect::<Vec<_>>().join(" or ");
+    Err(Error::IncompatibleView {
+        resource,
+        property,
+        expected,
+        found: format!("{found:?}"),
+    })
+}
+
+/// Checks that a host-made view has the usages that a pass needs.
+fn expect_usage(
+    resource: &'static str,
+    texture: &wgpu::Texture,
+    needed: wgpu::TextureUsages,
+) -> Result<(), Error> {
+    if texture.usage().contains(needed) {
+        return Ok(());
+    }
+    Err(Error::IncompatibleView {
+        resource,
+        property: "usage",
+        expected: format!("at least {needed:?}"),
+        found: format!("{:?}", texture.usage()),
+    })
+}
+
+/// Checks format, sample count and usage of a host-made two-dimensional view.
+fn expect_view(
+    resource: &'static str,
+    view: &wgpu::TextureView,
+    formats: &[wgpu::TextureFormat],
+    usage: wgpu::TextureUsages,
+) -> Result<(), Error> {
+    let texture = view.texture();
+    expect(resource, "format", texture.format(), formats)?;
+    expect(resource, "sample count", texture.sample_count(), &[1])?;
+    expect(resource, "dimension", texture.dimension(), &[wgpu::TextureDimension::D2])?;
+    expect_usage(resource, texture, usage)
+}
