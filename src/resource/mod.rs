@@ -26,7 +26,6 @@ pub use radiance::Radiance;
 pub use shadow_maps::ShadowMaps;
 pub use view::{CameraView, CaptureMask, CapturePurpose, CaptureView};
 
-pub(crate) use g_buffer::gpu::ViewUniform;
 
 use crate::Error;
 

@@ -1,9 +1,8 @@
 //! What a view looks at: the matrices, eye and purpose that the host's draws need.
 
 use super::cube_face::{CUBE_FACES, CubeFace};
-use crate::Error;
 use crate::scene::{Camera, Projection, UnitFrame};
-use glam::{DMat4, DVec3, DVec4, Mat4, Vec3, Vec4};
+use glam::{DMat4, DVec3, Mat4, Vec3, Vec4};
 
 /// Distance of the near plane, unit frame: a power of two, so that scaling a scene changes no bit of depth.
 pub(crate) const NEAR: f32 = 1.0 / 16384.0;
@@ -209,7 +208,7 @@ fn view_matrix(eye: Vec3, axes: CubeFace) -> Mat4 {
 /// Planes of the clip volume: −w ≤ x, y ≤ w and z ≤ w (reverse-Z near). Not normalised.
 fn frustum(matrix: Mat4) -> [[f32; 4]; 5] {
     let (x, y, z, w) = (matrix.row(0), matrix.row(1), matrix.row(2), matrix.row(3));
-    [w + x, w - x, w + y, w - y, w - z].map(Vec4::to_array)
+    [w + x, w - x, w + y, w - y, w - z].map(|plane| plane.to_array())
 }
 
 /// Two axes perpendicular to a direction, the same for the same direction.

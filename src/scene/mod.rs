@@ -17,6 +17,7 @@ mod unit_frame;
 pub use bounds::SceneBounds;
 pub use camera::{Camera, Projection};
 pub use instance::Instance;
+pub(crate) use light::one_minus_cos;
 pub use light::{Light, LightKind};
 pub use material::{Material, Texture};
 pub use mesh::Mesh;

@@ -2,12 +2,11 @@
 // photon mapping, section 3.3), added up by the raster units.
 
 struct Params {
-    first_slot: u32,
-    slot_count: u32,
-    max_radius: f32,
-    // Flux is multiplied by this before blending, so that sums fit the format; a power of two
-    blend_scale: f32,
     bandwidth: Bandwidth,
+    // First slot of the photon buffer to read
+    first_slot: u32,
+    // Largest radius in pixels
+    max_radius: f32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -48,7 +47,7 @@ fn vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) index: u3
     var clip = m * vec4f(p, 1.0);
     // The near plane must not cut a quad whose receivers it cannot cut.
     clip.z = 0.5 * clip.w;
-    return Quad(clip, photon.position, radius, photon.flux * params.blend_scale, normal);
+    return Quad(clip, photon.position, radius, photon.flux, normal);
 }
 
 @fragment

@@ -5,6 +5,7 @@
 // different power share a tile without loss, and the same frame gives the same bits.
 
 struct Params {
+    bandwidth: Bandwidth,
     // Slots of the photon buffer to read: from, how many
     first_slot: u32,
     slot_count: u32,
@@ -15,7 +16,6 @@ struct Params {
     max_radius: f32,
     // Capacity of the tile lists
     capacity: u32,
-    bandwidth: Bandwidth,
 }
 
 struct Splat {

@@ -1,0 +1,10 @@
+//! What the examples and tests share: finding an adapter, loading scenes, rendering without a window, writing files.
+#![allow(dead_code, reason = "each example uses its own part of this")]
+
+pub(crate) mod adapter;
+pub(crate) mod exr_file;
+pub(crate) mod gltf_scene;
+pub(crate) mod offline;
+pub(crate) mod picture;
+#[cfg(feature = "reference")]
+pub(crate) mod truth_file;

@@ -1,0 +1,220 @@
+//! Renders a scene without a window: one device, one view, any number of frames accumulated.
+
+use super::adapter::Gpu;
+use lightfall::frame::{GiRenderer, SceneInputs, Settings, ViewInputs, ViewResources};
+use lightfall::pass::{
+    Accumulator, AccumulatorInputs, AccumulatorResources, CompositeSettings, HopStatistics, TraceStatistics,
+    TraceStatisticsInputs, TraceStatisticsResources,
+};
+use lightfall::resource::{CameraView, Geometry, MeshGeometry, Radiance};
+use lightfall::scene::{Scene, SceneSummary};
+use lightfall::{Error, Timestamps, wgpu};
+
+/// Which part of the light to keep.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub(crate) enum Component {
+    #[default]
+    All,
+    Direct,
+    Indirect,
+}
+
+/// A scene on the GPU, ready to render frames of one camera.
+pub(crate) struct Offline<'a> {
+    gpu: &'a Gpu,
+    pub(crate) renderer: GiRenderer,
+    pub(crate) geometry: MeshGeometry,
+    pub(crate) view: ViewResources,
+    accumulator: Option<(Accumulator, AccumulatorResources)>,
+    scene: Scene,
+    camera: usize,
+    size: [u32; 2],
+    composite: CompositeSettings,
+    frames: u32,
+}
+
+impl<'a> Offline<'a> {
+    /// Uploads the scene, places environment maps, allocates. `settings.frames` above one accumulates.
+    pub(crate) fn new(
+        gpu: &'a Gpu,
+        scene: Scene,
+        settings: &Settings,
+        camera: usize,
+        size: [u32; 2],
+        component: Component,
+    ) -> Result<Self, Error> {
+        let (device, queue) = (&gpu.device, &gpu.queue);
+        let mut geometry = MeshGeometry::new(device, queue, &scene)?;
+        let mut renderer = GiRenderer::new(device, settings)?;
+        let frame = renderer.set_scene(queue, &SceneSummary::of(&scene)?, &scene.lights)?;
+        renderer.place_env_maps_blocking(queue, &mut geometry)?;
+        let weight = |on: bool| if on { 1.0 } else { 0.0 };
+        let composite = CompositeSettings {
+            output_scale: frame.output_scale(1.0)?,
+            direct: weight(component != Component::Indirect),
+            emission: weight(component != Component::Indirect),
+            indirect: weight(component != Component::Direct),
+        };
+        let accumulator = if settings.frames > 1 {
+            Some((Accumulator::new(device), AccumulatorResources::new(device, size)?))
+        } else {
+            None
+        };
+        Ok(Self {
+            gpu,
+            view: renderer.new_view(size)?,
+            renderer,
+            geometry,
+            accumulator,
+            scene,
+            camera,
+            size,
+            composite,
+            frames: 0,
+        })
+    }
+
+    /// Renders the next frame and waits for it.
+    pub(crate) fn render_frame(&mut self, timestamps: Option<&Timestamps>) -> Result<(), Error> {
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        let frame = self
+            .renderer
+            .set_scene(queue, &SceneSummary::of(&self.scene)?, &self.scene.lights)?;
+        let jitter = match self.accumulator {
+            Some(_) => [radical_inverse(self.frames + 1, 2) - 0.5, radical_inverse(self.frames + 1, 3) - 0.5],
+            None => [0.0; 2],
+        };
+        let mut cameras = [CameraView::new(&frame, &self.scene.cameras[self.camera], self.size, jitter)];
+        self.renderer.prepare(queue, &mut self.geometry, &mut cameras)?;
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let geometry: &dyn Geometry = &self.geometry;
+        let sample_offset = if self.accumulator.is_some() {
+            self.frames.wrapping_mul(self.renderer.settings().photons)
+        } else {
+            0
+        };
+        let scene_inputs = SceneInputs {
+            queue,
+            geometry,
+            sample_offset,
+            timestamps,
+        };
+        self.renderer.record_scene(&mut encoder, &scene_inputs);
+        let view_inputs = ViewInputs {
+            queue,
+            geometry,
+            view: &cameras[0],
+            composite: &self.composite,
+            timestamps,
+        };
+        self.renderer.record_view(&mut encoder, &mut self.view, &view_inputs)?;
+        if let Some((pass, resources)) = &mut self.accumulator {
+            let inputs = AccumulatorInputs {
+                queue,
+                radiance: self.view.radiance(),
+                timestamps,
+            };
+            pass.record(&mut encoder, resources, &inputs);
+        }
+        if let Some(timestamps) = timestamps {
+            timestamps.resolve(&mut encoder);
+        }
+        queue.submit([encoder.finish()]);
+        self.frames += 1;
+        wait(device)
+    }
+
+    /// Replaces the scene by the same one at another time: instances and lights may have moved.
+    pub(crate) fn set_scene(&mut self, scene: Scene) -> Result<(), Error> {
+        for (index, instance) in scene.instances.iter().enumerate() {
+            self.geometry.set_transform(index, instance.transform)?;
+        }
+        self.scene = scene;
+        self.frames = 0;
+        if let Some((_, resources)) = &mut self.accumulator {
+            resources.restart();
+        }
+        Ok(())
+    }
+
+    /// The image so far: the mean of all frames, or the last one.
+    pub(crate) fn radiance(&self) -> &Radiance {
+        match &self.accumulator {
+            Some((_, resources)) => resources.mean(),
+            None => self.view.radiance(),
+        }
+    }
+
+    /// The image so far as linear RGB, row by row from the top.
+    pub(crate) fn read(&self) -> Result<Vec<[f32; 3]>, Error> {
+        let texture = self.radiance().view().texture();
+        let texels = lightfall::read_rgba32float_blocking(&self.gpu.device, &self.gpu.queue, texture)?;
+        Ok(texels.into_iter().map(|[r, g, b, _]| [r, g, b]).collect())
+    }
+
+    /// The energy audit of the last frame, if it traced photons.
+    pub(crate) fn statistics(&self) -> Result<Vec<HopStatistics>, Error> {
+        let Some(photons) = self.renderer.photons() else {
+            return Ok(Vec::new());
+        };
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        let pass = TraceStatistics::new(device);
+        let mut resources = TraceStatisticsResources::new(device, photons)?;
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let inputs = TraceStatisticsInputs {
+            queue,
+            photons,
+            timestamps: None,
+        };
+        pass.record(&mut encoder, &mut resources, &inputs);
+        queue.submit([encoder.finish()]);
+        resources.read_blocking(device, queue)
+    }
+
+    /// Bytes of GPU memory, by resource.
+    pub(crate) fn memory_by_resource(&self) -> Vec<(&'static str, u64)> {
+        let mut list = self.renderer.memory_by_resource();
+        list.extend(self.view.memory_by_resource());
+        list.push(("geometry", self.geometry.memory_use()));
+        if let Some((_, resources)) = &self.accumulator {
+            list.push(("accumulator", resources.memory_use()));
+        }
+        list
+    }
+}
+
+/// Renders `settings.frames` frames of a scene; the short way for tests.
+pub(crate) fn render(
+    gpu: &Gpu,
+    scene: &Scene,
+    settings: &Settings,
+    size: [u32; 2],
+    component: Component,
+) -> Result<Vec<[f32; 3]>, Error> {
+    let mut offline = Offline::new(gpu, scene.clone(), settings, 0, size, component)?;
+    for _ in 0..settings.frames {
+        offline.render_frame(None)?;
+    }
+    offline.read()
+}
+
+fn wait(device: &wgpu::Device) -> Result<(), Error> {
+    device
+        .poll(wgpu::PollType::wait_indefinitely())
+        .map(drop)
+        .map_err(|e| Error::ReadBack {
+            what: "the frame",
+            reason: e.to_string(),
+        })
+}
+
+/// `index` mirrored at the radix point: jitter that covers a pixel evenly.
+fn radical_inverse(mut index: u32, base: u32) -> f64 {
+    let (mut value, mut weight) = (0.0, 1.0);
+    while index > 0 {
+        weight /= f64::from(base);
+        value += weight * f64::from(index % base);
+        index /= base;
+    }
+    value
+}

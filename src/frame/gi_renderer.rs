@@ -1,0 +1,573 @@
+//! Everything composed: a frame of global illumination from public passes.
+//!
+//! Each frame: [`GiRenderer::set_scene`] (what there is), [`GiRenderer::prepare`] (the host's geometry and every view),
+//! [`GiRenderer::record_scene`] once, [`GiRenderer::record_view`] for each view; then the host submits. Nothing is read
+//! back, submitted or, once settled, allocated on the way.
+
+use super::{Plan, Settings, Stage};
+use crate::pass::{
+    Composite, CompositeInputs, CompositeResources, CompositeSettings, DirectLight, DirectLightInputs,
+    DirectLightResources, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapSelector,
+    EnvMapSelectorInputs, EnvMapSelectorResources, GBufferCapture, GBufferCaptureInputs, ImageSpaceTracer,
+    ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources,
+    PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, ShadowMapCapture, ShadowMapCaptureInputs,
+    ShadowMapCaptureResources,
+};
+use crate::resource::{
+    CameraView, CapturePurpose, CaptureView, EnvMaps, GBuffer, Geometry, Irradiance, Lights, Photons, PrepareContext,
+    Radiance, ShadowMaps,
+};
+use crate::scene::{Light, SceneSummary, UnitFrame};
+use crate::{Error, Timestamps};
+use glam::Vec3;
+
+/// All passes and the resources that views share.
+#[derive(Debug)]
+pub struct GiRenderer {
+    device: wgpu::Device,
+    settings: Settings,
+    passes: Passes,
+    black: Irradiance,
+    direct: Option<DirectScene>,
+    indirect: Option<IndirectScene>,
+    state: Option<SceneState>,
+    /// All views of the frame, indexed; the last `prepare` filled it.
+    views: Vec<CaptureView>,
+    light_views: std::ops::Range<usize>,
+    env_map_views: std::ops::Range<usize>,
+}
+
+#[derive(Debug)]
+struct Passes {
+    g_buffer_capture: GBufferCapture,
+    shadow_map_capture: ShadowMapCapture,
+    direct_light: DirectLight,
+    env_map_capture: EnvMapCapture,
+    photon_emitter: PhotonEmitter,
+    image_space_tracer: ImageSpaceTracer,
+    photon_splatter: PhotonSplatter,
+    composite: Composite,
+}
+
+/// What the scene is, as of the last `set_scene`.
+#[derive(Debug)]
+struct SceneState {
+    frame: UnitFrame,
+    plan: Plan,
+    lights: Vec<Light>,
+    /// Corners of the region and its area, unit frame.
+    min: Vec3,
+    max: Vec3,
+    area: f32,
+}
+
+/// Allocated while there is a light.
+#[derive(Debug)]
+struct DirectScene {
+    lights: Lights,
+    shadow_maps: ShadowMaps,
+    shadow_layers: u32,
+    capture: ShadowMapCaptureResources,
+}
+
+/// Allocated while there is indirect light.
+#[derive(Debug)]
+struct IndirectScene {
+    env_maps: EnvMaps,
+    capture: EnvMapCaptureResources,
+    photons: Photons,
+    emitter: PhotonEmitterResources,
+    tracer: ImageSpaceTracerResources,
+}
+
+/// Resources of one view.
+#[derive(Debug)]
+pub struct ViewResources {
+    g_buffer: GBuffer,
+    radiance: Radiance,
+    composite: CompositeResources,
+    direct: Option<(Irradiance, DirectLightResources)>,
+    indirect: Option<(Irradiance, PhotonSplatterResources)>,
+    size: [u32; 2],
+}
+
+/// What [`GiRenderer::record_scene`] needs.
+#[derive(Clone, Copy)]
+#[allow(missing_debug_implementations, reason = "holds a trait object of the host's")]
+pub struct SceneInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// The geometry that was prepared.
+    pub geometry: &'a dyn Geometry,
+    /// First index into the random sequence: constant in real time; advanced by the number of photons per frame when
+    /// accumulating.
+    pub sample_offset: u32,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+/// What [`GiRenderer::record_view`] needs.
+#[derive(Clone, Copy)]
+#[allow(missing_debug_implementations, reason = "holds a trait object of the host's")]
+pub struct ViewInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// The geometry that was prepared.
+    pub geometry: &'a dyn Geometry,
+    /// One of the views that were prepared.
+    pub view: &'a CameraView,
+    /// What to show; `output_scale` is taken as given, see [`UnitFrame::output_scale`].
+    pub composite: &'a CompositeSettings,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+impl GiRenderer {
+    /// Features that these settings need: none, unless they ask for quads blended in f32.
+    pub fn required_features(settings: &Settings) -> wgpu::Features {
+        PhotonSplatter::required_features(&settings.splatter_config)
+    }
+
+    /// Limits that suffice for any settings: the defaults. Large photon counts may ask for larger storage buffers.
+    pub fn required_limits() -> wgpu::Limits {
+        wgpu::Limits::default()
+    }
+
+    /// All passes, for [`Radiance`] of `rgba32float`.
+    ///
+    /// # Errors
+    /// [`Error::InvalidSetting`], [`Error::MissingFeatures`].
+    pub fn new(device: &wgpu::Device, settings: &Settings) -> Result<Self, Error> {
+        settings.validate()?;
+        let passes = Passes {
+            g_buffer_capture: GBufferCapture::new(),
+            shadow_map_capture: ShadowMapCapture::new(),
+            direct_light: DirectLight::new(device),
+            env_map_capture: EnvMapCapture::new(),
+            photon_emitter: PhotonEmitter::new(device),
+            image_space_tracer: ImageSpaceTracer::new(device),
+            photon_splatter: PhotonSplatter::new(device, &settings.splatter_config)?,
+            composite: Composite::new(device, wgpu::TextureFormat::Rgba32Float),
+        };
+        Ok(Self {
+            device: device.clone(),
+            settings: settings.clone(),
+            passes,
+            black: Irradiance::new(device, [1, 1], wgpu::TextureFormat::Rgba32Float)?,
+            direct: None,
+            indirect: None,
+            state: None,
+            views: Vec::new(),
+            light_views: 0..0,
+            env_map_views: 0..0,
+        })
+    }
+
+    /// Says what the scene is this frame: plans the stages, keeps or renews the unit frame, uploads the lights, allocates
+    /// what newly became necessary and drops what no longer is. Returns the frame for building views.
+    ///
+    /// # Errors
+    /// [`Error::InvalidBounds`], [`Error::InvalidScene`] for a bad light, [`Error::LimitExceeded`].
+    pub fn set_scene(
+        &mut self,
+        queue: &wgpu::Queue,
+        summary: &SceneSummary,
+        lights: &[Light],
+    ) -> Result<UnitFrame, Error> {
+        for (index, light) in lights.iter().enumerate() {
+            light.validate(index)?;
+        }
+        let frame = match &self.state {
+            Some(state) => state.frame.follow(&summary.bounds, summary.total_flux)?,
+            None => UnitFrame::new(&summary.bounds, summary.total_flux)?,
+        };
+        let plan = Plan::for_scene(summary, &self.settings);
+        self.allocate(&plan, lights)?;
+        let length = frame.length_scale();
+        let state = SceneState {
+            frame,
+            plan,
+            lights: lights.to_vec(),
+            min: frame.point(summary.bounds.min),
+            max: frame.point(summary.bounds.max),
+            area: (summary.area / (length * length)) as f32,
+        };
+        if let Some(direct) = &mut self.direct {
+            direct.lights.write(queue, &frame, lights, self.settings.photons)?;
+        }
+        if let Some(indirect) = &mut self.indirect
+            && (indirect.env_maps.centers().is_empty() || self.state.as_ref().is_none_or(|s| s.frame != frame))
+        {
+            let centers = EnvMapSelector::candidates(state.min, state.max, self.settings.env_map_count);
+            indirect.env_maps.set_centers(queue, &centers)?;
+        }
+        self.state = Some(state);
+        Ok(frame)
+    }
+
+    fn allocate(&mut self, plan: &Plan, lights: &[Light]) -> Result<(), Error> {
+        let (device, settings) = (&self.device, &self.settings);
+        if !plan.is_on(Stage::DirectLight) {
+            self.direct = None;
+        } else if self.direct.as_ref().is_none_or(|d| d.shadow_layers != ShadowMaps::layers(lights)) {
+            self.direct = Some(DirectScene {
+                lights: Lights::new(device)?,
+                shadow_maps: ShadowMaps::new(device, lights, settings.shadow_map_size)?,
+                shadow_layers: ShadowMaps::layers(lights),
+                capture: ShadowMapCaptureResources::new(device, settings.shadow_map_size)?,
+            });
+        }
+        if !plan.is_on(Stage::ImageSpaceTracer) {
+            self.indirect = None;
+        } else if self.indirect.is_none() {
+            self.indirect = Some(IndirectScene {
+                env_maps: EnvMaps::new(device, settings.env_map_count, settings.env_map_size)?,
+                capture: EnvMapCaptureResources::new(device, settings.env_map_size)?,
+                photons: Photons::new(device, settings.photons, settings.bounces)?,
+                emitter: PhotonEmitterResources::new(device)?,
+                tracer: ImageSpaceTracerResources::new(device)?,
+            });
+        }
+        Ok(())
+    }
+
+    /// Tries the candidates and places the environment maps at the first valid ones. Submits and waits: for headless use
+    /// and loading screens. Until it is called, maps stand at the first candidates, valid or not.
+    ///
+    /// # Errors
+    /// [`Error::ReadBack`], [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
+    pub fn place_env_maps_blocking(
+        &mut self,
+        queue: &wgpu::Queue,
+        geometry: &mut dyn Geometry,
+    ) -> Result<(), Error> {
+        let (Some(state), Some(indirect)) = (&self.state, &mut self.indirect) else {
+            return Ok(());
+        };
+        let settings = &self.settings.selector;
+        let count = settings.candidates.max(self.settings.env_map_count);
+        let candidates = EnvMapSelector::candidates(state.min, state.max, count);
+        let selector = EnvMapSelector::new(&self.device);
+        let mut resources = EnvMapSelectorResources::new(&self.device, count)?;
+        resources.env_maps().set_centers(queue, &candidates)?;
+        let mut views: Vec<CaptureView> = resources.env_maps().views(CapturePurpose::Candidate).collect();
+        number(&mut views);
+        let context = PrepareContext {
+            device: &self.device,
+            queue,
+            frame: &state.frame,
+        };
+        geometry.prepare(&context, &views)?;
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        let inputs = EnvMapSelectorInputs {
+            queue,
+            geometry,
+            views: &views,
+            timestamps: None,
+        };
+        selector.record(&mut encoder, &mut resources, &inputs);
+        queue.submit([encoder.finish()]);
+        let sights = resources.read_blocking(&self.device, queue)?;
+        let radius = state.frame.radius();
+        let chosen = EnvMapSelector::choose(&sights, settings, radius, self.settings.env_map_count as usize);
+        let centers: Vec<Vec3> = chosen.into_iter().map(|i| candidates[i]).collect();
+        indirect.env_maps.set_centers(queue, &centers)
+    }
+
+    /// Places the environment maps by hand, unit frame; up to [`Settings::env_map_count`].
+    ///
+    /// # Errors
+    /// [`Error::CountMismatch`] for too many.
+    pub fn set_env_map_centers(&mut self, queue: &wgpu::Queue, centers: &[Vec3]) -> Result<(), Error> {
+        match &mut self.indirect {
+            Some(indirect) => indirect.env_maps.set_centers(queue, centers),
+            None => Ok(()),
+        }
+    }
+
+    /// Collects every view of the frame, numbers them, and lets the geometry prepare for them.
+    ///
+    /// # Errors
+    /// What the geometry's `prepare` returns.
+    pub fn prepare(
+        &mut self,
+        queue: &wgpu::Queue,
+        geometry: &mut dyn Geometry,
+        cameras: &mut [CameraView],
+    ) -> Result<(), Error> {
+        let Some(state) = &self.state else {
+            return Ok(());
+        };
+        self.views.clear();
+        self.views.extend(cameras.iter().map(|c| c.capture));
+        let lights_from = self.views.len();
+        if let Some(direct) = &self.direct {
+            self.views.extend(direct.shadow_maps.views(&state.frame, &state.lights));
+        }
+        let maps_from = self.views.len();
+        if let Some(indirect) = &self.indirect {
+            self.views.extend(indirect.env_maps.views(CapturePurpose::EnvMap));
+        }
+        number(&mut self.views);
+        for (camera, view) in cameras.iter_mut().zip(&self.views) {
+            camera.capture = *view;
+        }
+        self.light_views = lights_from..maps_from;
+        self.env_map_views = maps_from..self.views.len();
+        let context = PrepareContext {
+            device: &self.device,
+            queue,
+            frame: &state.frame,
+        };
+        geometry.prepare(&context, &self.views)
+    }
+
+    /// Records what all views share: shadow maps, environment maps, photons.
+    pub fn record_scene(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) {
+        let Some(direct) = &mut self.direct else {
+            return;
+        };
+        let shadow_inputs = ShadowMapCaptureInputs {
+            shadow_maps: &direct.shadow_maps,
+            geometry: inputs.geometry,
+            views: &self.views[self.light_views.clone()],
+            timestamps: inputs.timestamps,
+        };
+        self.passes
+            .shadow_map_capture
+            .record(encoder, &mut direct.capture, &shadow_inputs);
+        let Some(indirect) = &mut self.indirect else {
+            return;
+        };
+        let capture_inputs = EnvMapCaptureInputs {
+            env_maps: &indirect.env_maps,
+            geometry: inputs.geometry,
+            views: &self.views[self.env_map_views.clone()],
+            timestamps: inputs.timestamps,
+        };
+        self.passes
+            .env_map_capture
+            .record(encoder, &mut indirect.capture, &capture_inputs);
+        let emitter_inputs = PhotonEmitterInputs {
+            queue: inputs.queue,
+            lights: &direct.lights,
+            shadow_maps: &direct.shadow_maps,
+            photons: &indirect.photons,
+            sample_offset: inputs.sample_offset,
+            timestamps: inputs.timestamps,
+        };
+        self.passes
+            .photon_emitter
+            .record(encoder, &mut indirect.emitter, &emitter_inputs);
+        let tracer_inputs = ImageSpaceTracerInputs {
+            queue: inputs.queue,
+            env_maps: &indirect.env_maps,
+            photons: &indirect.photons,
+            sample_offset: inputs.sample_offset,
+            settings: &self.settings.tracer,
+            timestamps: inputs.timestamps,
+        };
+        self.passes
+            .image_space_tracer
+            .record(encoder, &mut indirect.tracer, &tracer_inputs);
+    }
+
+    /// Resources of a view of `size` pixels.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`].
+    pub fn new_view(&self, size: [u32; 2]) -> Result<ViewResources, Error> {
+        Ok(ViewResources {
+            g_buffer: GBuffer::new(&self.device, size)?,
+            radiance: Radiance::new(&self.device, size)?,
+            composite: CompositeResources::new(&self.device)?,
+            direct: None,
+            indirect: None,
+            size,
+        })
+    }
+
+    /// Records one view: its G-buffer, its irradiance, the sum. Two views of one submission need two [`ViewResources`].
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] when a stage that the view needs for the first time does not fit.
+    pub fn record_view(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut ViewResources,
+        inputs: &ViewInputs<'_>,
+    ) -> Result<(), Error> {
+        self.allocate_view(resources)?;
+        let g_buffer_inputs = GBufferCaptureInputs {
+            queue: inputs.queue,
+            geometry: inputs.geometry,
+            view: inputs.view,
+            timestamps: inputs.timestamps,
+        };
+        self.passes
+            .g_buffer_capture
+            .record(encoder, &mut resources.g_buffer, &g_buffer_inputs);
+        if let (Some(scene), Some((irradiance, own))) = (&self.direct, &mut resources.direct) {
+            let direct_inputs = DirectLightInputs {
+                queue: inputs.queue,
+                g_buffer: &resources.g_buffer,
+                lights: &scene.lights,
+                shadow_maps: &scene.shadow_maps,
+                irradiance,
+                timestamps: inputs.timestamps,
+            };
+            self.passes.direct_light.record(encoder, own, &direct_inputs);
+        }
+        if let (Some(scene), Some((irradiance, own)), Some(state)) =
+            (&self.indirect, &mut resources.indirect, &self.state)
+        {
+            let splatter_inputs = PhotonSplatterInputs {
+                queue: inputs.queue,
+                photons: &scene.photons,
+                g_buffer: &resources.g_buffer,
+                irradiance,
+                area: state.area,
+                radius: state.frame.radius(),
+                settings: &self.settings.splatter,
+                timestamps: inputs.timestamps,
+            };
+            self.passes.photon_splatter.record(encoder, own, &splatter_inputs);
+        }
+        let composite_inputs = CompositeInputs {
+            queue: inputs.queue,
+            g_buffer: &resources.g_buffer,
+            direct: resources.direct.as_ref().map_or(&self.black, |d| &d.0),
+            indirect: resources.indirect.as_ref().map_or(&self.black, |i| &i.0),
+            radiance: &resources.radiance,
+            settings: inputs.composite,
+            timestamps: inputs.timestamps,
+        };
+        self.passes
+            .composite
+            .record(encoder, &mut resources.composite, &composite_inputs);
+        Ok(())
+    }
+
+    fn allocate_view(&self, view: &mut ViewResources) -> Result<(), Error> {
+        let (device, size) = (&self.device, view.size);
+        match &self.direct {
+            None => view.direct = None,
+            Some(_) if view.direct.is_none() => {
+                let irradiance = Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?;
+                view.direct = Some((irradiance, DirectLightResources::new(device)?));
+            }
+            Some(_) => {}
+        }
+        match &self.indirect {
+            None => view.indirect = None,
+            Some(scene) if view.indirect.is_none() => {
+                let config = &self.settings.splatter_config;
+                let irradiance = Irradiance::new(device, size, config.format())?;
+                let own = PhotonSplatterResources::new(device, config, &scene.photons, size)?;
+                view.indirect = Some((irradiance, own));
+            }
+            Some(_) => {}
+        }
+        Ok(())
+    }
+
+    /// The settings it was made with.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// The plan of the last `set_scene`.
+    pub fn plan(&self) -> Option<&Plan> {
+        self.state.as_ref().map(|s| &s.plan)
+    }
+
+    /// The unit frame of the last `set_scene`.
+    pub fn frame(&self) -> Option<&UnitFrame> {
+        self.state.as_ref().map(|s| &s.frame)
+    }
+
+    /// Environment maps, while there is indirect light.
+    pub fn env_maps(&self) -> Option<&EnvMaps> {
+        self.indirect.as_ref().map(|i| &i.env_maps)
+    }
+
+    /// Shadow maps, while there is a light.
+    pub fn shadow_maps(&self) -> Option<&ShadowMaps> {
+        self.direct.as_ref().map(|d| &d.shadow_maps)
+    }
+
+    /// Photons, while there is indirect light.
+    pub fn photons(&self) -> Option<&Photons> {
+        self.indirect.as_ref().map(|i| &i.photons)
+    }
+
+    /// Bytes that all views share, by resource.
+    pub fn memory_by_resource(&self) -> Vec<(&'static str, u64)> {
+        let mut list = vec![("black", self.black.memory_use())];
+        if let Some(direct) = &self.direct {
+            list.push(("lights", direct.lights.memory_use()));
+            list.push(("shadow_maps", direct.shadow_maps.memory_use() + direct.capture.memory_use()));
+        }
+        if let Some(indirect) = &self.indirect {
+            list.push(("env_maps", indirect.env_maps.memory_use() + indirect.capture.memory_use()));
+            list.push(("photons", indirect.photons.memory_use()));
+            list.push(("uniforms", indirect.emitter.memory_use() + indirect.tracer.memory_use()));
+        }
+        list
+    }
+
+    /// Bytes that all views share.
+    pub fn memory_use(&self) -> u64 {
+        self.memory_by_resource().iter().map(|r| r.1).sum()
+    }
+}
+
+impl ViewResources {
+    /// The finished image.
+    pub fn radiance(&self) -> &Radiance {
+        &self.radiance
+    }
+
+    /// What the eye sees.
+    pub fn g_buffer(&self) -> &GBuffer {
+        &self.g_buffer
+    }
+
+    /// Direct irradiance, if there is a light.
+    pub fn direct(&self) -> Option<&Irradiance> {
+        self.direct.as_ref().map(|d| &d.0)
+    }
+
+    /// Indirect irradiance, if there is any.
+    pub fn indirect(&self) -> Option<&Irradiance> {
+        self.indirect.as_ref().map(|i| &i.0)
+    }
+
+    /// Bytes of this view, by resource.
+    pub fn memory_by_resource(&self) -> Vec<(&'static str, u64)> {
+        let mut list = vec![
+            ("g_buffer", self.g_buffer.memory_use()),
+            ("radiance", self.radiance.memory_use() + self.composite.memory_use()),
+        ];
+        if let Some((irradiance, own)) = &self.direct {
+            list.push(("direct_irradiance", irradiance.memory_use() + own.memory_use()));
+        }
+        if let Some((irradiance, own)) = &self.indirect {
+            list.push(("indirect_irradiance", irradiance.memory_use()));
+            list.push(("splatter", own.memory_use()));
+        }
+        list
+    }
+
+    /// Bytes of this view.
+    pub fn memory_use(&self) -> u64 {
+        self.memory_by_resource().iter().map(|r| r.1).sum()
+    }
+}
+
+/// Gives every view its position in the list.
+fn number(views: &mut [CaptureView]) {
+    for (index, view) in (0..).zip(views) {
+        view.index = index;
+    }
+}

@@ -1,0 +1,10 @@
+//! Layer 4: everything composed. [`Settings`] say how much to spend, [`Plan`] which stages a scene needs and why,
+//! [`GiRenderer`] records them in order. It uses public passes only: whatever it does, a host can do by hand.
+
+mod gi_renderer;
+mod plan;
+mod settings;
+
+pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};
+pub use plan::{Plan, PlannedStage, Stage};
+pub use settings::Settings;

@@ -1,0 +1,215 @@
+//! Model only what the scene requires: which stages run, and why.
+
+use super::Settings;
+use crate::scene::SceneSummary;
+use std::fmt;
+
+/// A stage of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Stage {
+    /// What the eye sees.
+    GBufferCapture,
+    /// What the lights see.
+    ShadowMapCapture,
+    /// Direct irradiance.
+    DirectLight,
+    /// What is around a few points.
+    EnvMapCapture,
+    /// Photons from lights.
+    PhotonEmitter,
+    /// Photons from surface to surface.
+    ImageSpaceTracer,
+    /// Photons to irradiance.
+    PhotonSplatter,
+    /// Photons by way of mirrors and glass.
+    CausticPhotons,
+    /// Penumbrae.
+    SoftShadow,
+    /// The sum.
+    Composite,
+}
+
+impl Stage {
+    /// Name as in [`pass`](crate::pass).
+    pub fn name(&self) -> String {
+        format!("{self:?}")
+    }
+}
+
+/// One stage, whether it runs, and the reason.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlannedStage {
+    /// The stage.
+    pub stage: Stage,
+    /// Whether it allocates and records anything.
+    pub on: bool,
+    /// Why.
+    pub reason: String,
+}
+
+/// Every stage with its reason, and what of the scene is simplified. Its `Display` reads like a table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// All stages in the order of a frame.
+    pub stages: Vec<PlannedStage>,
+    /// What the scene has that is not modelled yet, and what is done instead.
+    pub simplifications: Vec<String>,
+}
+
+impl Plan {
+    /// Decides from what is in the scene and what the settings allow.
+    pub fn for_scene(summary: &SceneSummary, settings: &Settings) -> Self {
+        let light_exists = summary.lights > 0;
+        let lit = if light_exists {
+            (true, format!("{} light(s)", summary.lights))
+        } else {
+            (false, "no light".to_owned())
+        };
+        let indirect = indirect(summary, settings);
+        let specular: Vec<_> = summary.metals.iter().chain(&summary.dielectrics).cloned().collect();
+        let caustics = if specular.is_empty() {
+            "no specular surface".to_owned()
+        } else {
+            "not modelled yet".to_owned()
+        };
+        let soft = match summary.lights_with_extent {
+            0 => "no light has an extent".to_owned(),
+            n => format!("{n} light(s) with an extent: not modelled yet"),
+        };
+        let stage = |stage, (on, reason): (bool, String)| PlannedStage { stage, on, reason };
+        let always = |reason: &str| (true, reason.to_owned());
+        let maps = (indirect.0, map_reason(&indirect, settings));
+        Self {
+            stages: vec![
+                stage(Stage::GBufferCapture, always("every view")),
+                stage(Stage::ShadowMapCapture, lit.clone()),
+                stage(Stage::DirectLight, lit),
+                stage(Stage::EnvMapCapture, maps),
+                stage(Stage::PhotonEmitter, indirect.clone()),
+                stage(Stage::ImageSpaceTracer, indirect.clone()),
+                stage(Stage::PhotonSplatter, indirect),
+                stage(Stage::CausticPhotons, (false, caustics)),
+                stage(Stage::SoftShadow, (false, soft)),
+                stage(Stage::Composite, always("every view")),
+            ],
+            simplifications: simplifications(summary),
+        }
+    }
+
+    /// Whether a stage runs.
+    pub fn is_on(&self, stage: Stage) -> bool {
+        self.stages.iter().any(|s| s.stage == stage && s.on)
+    }
+}
+
+fn indirect(summary: &SceneSummary, settings: &Settings) -> (bool, String) {
+    let off = |reason: &str| (false, reason.to_owned());
+    if summary.lights == 0 {
+        off("no light")
+    } else if !summary.has_reflecting_surfaces {
+        off("every surface is black")
+    } else if settings.bounces == 0 {
+        off("settings allow no bounces")
+    } else if settings.photons == 0 {
+        off("settings allow no photons")
+    } else {
+        let reason = format!("{} photons, {} bounce(s)", settings.photons, settings.bounces);
+        (true, reason)
+    }
+}
+
+fn map_reason(indirect: &(bool, String), settings: &Settings) -> String {
+    if indirect.0 {
+        format!("{} maps of 6 × {}²", settings.env_map_count, settings.env_map_size)
+    } else {
+        indirect.1.clone()
+    }
+}
+
+fn simplifications(summary: &SceneSummary) -> Vec<String> {
+    let list = |names: &[String]| names.join(", ");
+    let mut notes = Vec::new();
+    if !summary.emissive.is_empty() {
+        notes.push(format!("shine for the eye alone, light nothing: {}", list(&summary.emissive)));
+    }
+    if !summary.metals.is_empty() {
+        notes.push(format!("metal, treated as Lambertian: {}", list(&summary.metals)));
+    }
+    if !summary.dielectrics.is_empty() {
+        notes.push(format!("glass, treated as Lambertian: {}", list(&summary.dielectrics)));
+    }
+    if summary.lights_with_extent > 0 {
+        notes.push(format!(
+            "{} light(s) with an extent, treated as points: hard shadows",
+            summary.lights_with_extent
+        ));
+    }
+    notes
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for stage in &self.stages {
+            let on = if stage.on { "on" } else { "off" };
+            writeln!(f, "{:<17} {on:<4} {}", stage.stage.name(), stage.reason)?;
+        }
+        for note in &self.simplifications {
+            writeln!(f, "{:<17} {:<4} {note}", "simplified", "")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::SceneBounds;
+    use glam::DVec3;
+
+    fn summary() -> SceneSummary {
+        SceneSummary {
+            bounds: SceneBounds::new(DVec3::ZERO, DVec3::ONE).unwrap(),
+            area: 6.0,
+            triangles: 12,
+            total_flux: 1.0,
+            lights: 1,
+            lights_with_extent: 0,
+            has_reflecting_surfaces: true,
+            emissive: Vec::new(),
+            metals: Vec::new(),
+            dielectrics: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn indirect_light_needs_lights_reflection_bounces_and_photons() {
+        let settings = Settings::balanced();
+        let on = |summary: &SceneSummary, settings: &Settings| {
+            Plan::for_scene(summary, settings).is_on(Stage::ImageSpaceTracer)
+        };
+        assert!(on(&summary(), &settings));
+        assert!(!on(&SceneSummary { lights: 0, ..summary() }, &settings));
+        let black = SceneSummary {
+            has_reflecting_surfaces: false,
+            ..summary()
+        };
+        assert!(!on(&black, &settings));
+        assert!(!on(&summary(), &Settings { bounces: 0, ..settings.clone() }));
+        assert!(!on(&summary(), &Settings { photons: 0, ..settings.clone() }));
+    }
+
+    #[test]
+    fn what_is_not_modelled_is_named() {
+        let summary = SceneSummary {
+            emissive: vec!["ceiling lamp".into()],
+            metals: vec!["chrome".into()],
+            dielectrics: vec!["window".into()],
+            lights_with_extent: 1,
+            ..summary()
+        };
+        let text = Plan::for_scene(&summary, &Settings::balanced()).to_string();
+        for name in ["ceiling lamp", "chrome", "window", "hard shadows"] {
+            assert!(text.contains(name), "{name} in\n{text}");
+        }
+    }
+}

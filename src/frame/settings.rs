@@ -1,0 +1,341 @@
+//! How much to spend on what: every knob of every stage, three presets, and access by name.
+
+use crate::Error;
+use crate::pass::{
+    Bandwidth, EnvMapSelectorSettings, HitTest, ImageSpaceTracerSettings, Kernel, PhotonSplatterConfig,
+    PhotonSplatterSettings, SplatShape,
+};
+
+/// Most scatterings of a path.
+const MAX_BOUNCES: u32 = 64;
+
+/// Most environment maps: 6 × 42 + 1 layers of the 256 that every device grants.
+const MAX_ENV_MAPS: u32 = 42;
+
+/// Settings of all stages. Start from a preset and change fields, or [`Settings::set`] them by name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Frames to accumulate for one image: noise falls as their number grows. 1 in real time.
+    pub frames: u32,
+    /// Photons emitted a frame. Cost grows in proportion; noise falls as the square root.
+    pub photons: u32,
+    /// Surfaces that light scatters at before the one the eye sees, 0 to 64. 0: direct light only. Each costs a trace;
+    /// leaving out bounces darkens.
+    pub bounces: u32,
+    /// Environment maps, 1 to 42. More find more of what rays hit and cost six captures each.
+    pub env_map_count: u32,
+    /// Texels along a face of an environment map. Finer resolves thinner things.
+    pub env_map_size: u32,
+    /// Texels along a layer of a shadow map.
+    pub shadow_map_size: u32,
+    /// Where environment maps are taken from.
+    pub selector: EnvMapSelectorSettings,
+    /// How rays are traced.
+    pub tracer: ImageSpaceTracerSettings,
+    /// How photons are drawn.
+    pub splatter_config: PhotonSplatterConfig,
+    /// How wide.
+    pub splatter: PhotonSplatterSettings,
+}
+
+impl Default for Settings {
+    /// [`Settings::balanced`].
+    fn default() -> Self {
+        Self::balanced()
+    }
+}
+
+impl Settings {
+    /// Smallest cost that still looks right.
+    pub fn fast() -> Self {
+        Self {
+            photons: 30_000,
+            bounces: 2,
+            env_map_count: 6,
+            env_map_size: 64,
+            shadow_map_size: 256,
+            tracer: ImageSpaceTracerSettings {
+                iterations: 5,
+                ..Default::default()
+            },
+            ..Self::balanced()
+        }
+    }
+
+    /// The default.
+    pub fn balanced() -> Self {
+        Self {
+            frames: 1,
+            photons: 100_000,
+            bounces: 3,
+            env_map_count: 8,
+            env_map_size: 128,
+            shadow_map_size: 512,
+            selector: EnvMapSelectorSettings::default(),
+            tracer: ImageSpaceTracerSettings::default(),
+            splatter_config: PhotonSplatterConfig::default(),
+            splatter: PhotonSplatterSettings::default(),
+        }
+    }
+
+    /// Accumulates frames; narrower kernels, finer and more maps.
+    pub fn accurate() -> Self {
+        Self {
+            frames: 64,
+            photons: 200_000,
+            env_map_count: 12,
+            env_map_size: 256,
+            shadow_map_size: 1024,
+            splatter: PhotonSplatterSettings {
+                bandwidth: Bandwidth::Density {
+                    photons: 20.0,
+                    clamp: [0.25, 8.0],
+                },
+                ..Default::default()
+            },
+            ..Self::balanced()
+        }
+    }
+
+    /// A preset by name: "fast", "balanced", "accurate".
+    pub fn preset(name: &str) -> Option<Self> {
+        Some(match name {
+            "fast" => Self::fast(),
+            "balanced" => Self::balanced(),
+            "accurate" => Self::accurate(),
+            _ => return None,
+        })
+    }
+
+    /// Sets one field by its dotted name, as listed by [`Settings::entries`].
+    ///
+    /// # Errors
+    /// [`Error::UnknownSetting`] names all there are; [`Error::InvalidSetting`] says what would be accepted.
+    pub fn set(&mut self, key: &str, value: &str) -> Result<(), Error> {
+        let Some(knob) = KNOBS.iter().find(|k| k.name == key) else {
+            return Err(Error::UnknownSetting {
+                key: key.into(),
+                known: KNOBS.iter().map(|k| k.name).collect::<Vec<_>>().join(", "),
+            });
+        };
+        let mut changed = self.clone();
+        if (knob.set)(&mut changed, value).is_none() || !(knob.is_valid)(&changed) {
+            return Err(knob.error(value));
+        }
+        *self = changed;
+        Ok(())
+    }
+
+    /// Every setting by name, with its value as text.
+    pub fn entries(&self) -> Vec<(&'static str, String)> {
+        KNOBS.iter().map(|k| (k.name, (k.get)(self))).collect()
+    }
+
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// [`Error::InvalidSetting`] for the first that is out of range.
+    pub fn validate(&self) -> Result<(), Error> {
+        match KNOBS.iter().find(|k| !(k.is_valid)(self)) {
+            Some(knob) => Err(knob.error(&(knob.get)(self))),
+            None => Ok(()),
+        }
+    }
+
+    fn density(&mut self) -> (&mut f32, &mut [f32; 2]) {
+        if let Bandwidth::Fixed(_) = self.splatter.bandwidth {
+            self.splatter.bandwidth = PhotonSplatterSettings::default().bandwidth;
+        }
+        match &mut self.splatter.bandwidth {
+            Bandwidth::Density { photons, clamp } => (photons, clamp),
+            Bandwidth::Fixed(_) => unreachable!("replaced above"),
+        }
+    }
+
+    /// k and clamp of the density bandwidth; zeros while the bandwidth is fixed.
+    fn density_values(&self) -> (f32, [f32; 2]) {
+        match self.splatter.bandwidth {
+            Bandwidth::Density { photons, clamp } => (photons, clamp),
+            Bandwidth::Fixed(_) => (0.0, [0.0; 2]),
+        }
+    }
+
+    fn is_fixed(&self) -> bool {
+        matches!(self.splatter.bandwidth, Bandwidth::Fixed(_))
+    }
+}
+
+/// One setting by name.
+struct Knob {
+    name: &'static str,
+    expected: &'static str,
+    get: fn(&Settings) -> String,
+    set: fn(&mut Settings, &str) -> Option<()>,
+    is_valid: fn(&Settings) -> bool,
+}
+
+impl Knob {
+    fn error(&self, value: &str) -> Error {
+        Error::InvalidSetting {
+            key: self.name.into(),
+            value: value.into(),
+            expected: self.expected.into(),
+        }
+    }
+}
+
+/// A knob over a plain field that parses from text.
+macro_rules! field {
+    ($name:literal, $expected:literal, $($path:ident).+, $valid:expr) => {
+        Knob {
+            name: $name,
+            expected: $expected,
+            get: |s| s.$($path).+.to_string(),
+            set: |s, v| { s.$($path).+ = v.parse().ok()?; Some(()) },
+            is_valid: |s| ($valid)(s.$($path).+),
+        }
+    };
+}
+
+/// A knob over an enumeration with names.
+macro_rules! choice {
+    ($name:literal, $expected:literal, $($path:ident).+, $([$text:literal, $value:path]),+) => {
+        Knob {
+            name: $name,
+            expected: $expected,
+            get: |s| match s.$($path).+ { $($value => $text),+ }.to_string(),
+            set: |s, v| { s.$($path).+ = match v { $($text => $value,)+ _ => return None }; Some(()) },
+            is_valid: |_| true,
+        }
+    };
+}
+
+const KNOBS: &[Knob] = &[
+    field!("frames", "1 or more", frames, |v| v >= 1),
+    field!("photons", "0 to 100000000", photons, |v| v <= 100_000_000),
+    field!("bounces", "0 to 64", bounces, |v| v <= MAX_BOUNCES),
+    field!("env_maps.count", "1 to 42", env_map_count, |v| (1..=MAX_ENV_MAPS).contains(&v)),
+    field!("env_maps.size", "4 to 8192", env_map_size, |v| (4..=8192).contains(&v)),
+    field!("shadow_maps.size", "4 to 8192", shadow_map_size, |v| (4..=8192).contains(&v)),
+    field!("selector.candidates", "1 to 42", selector.candidates, |v| (1..=MAX_ENV_MAPS).contains(&v)),
+    field!("selector.back_face_limit", "0 to 1", selector.back_face_limit, |v| (0.0..=1.0).contains(&v)),
+    field!("selector.clearance", "0 to 1", selector.clearance, |v| (0.0..=1.0).contains(&v)),
+    choice!(
+        "tracer.hit_test",
+        "angle or texel-plane",
+        tracer.hit_test,
+        ["angle", HitTest::Angle],
+        ["texel-plane", HitTest::TexelPlane]
+    ),
+    field!("tracer.iterations", "1 to 32", tracer.iterations, |v| (1..=32).contains(&v)),
+    field!("tracer.roulette_from", "1 or more", tracer.roulette_from, |v| v >= 1),
+    choice!(
+        "splatter.shape",
+        "tiled or quads",
+        splatter_config.shape,
+        ["tiled", SplatShape::Tiled],
+        ["quads", SplatShape::Quads]
+    ),
+    choice!(
+        "splatter.kernel",
+        "constant, cone or epanechnikov",
+        splatter_config.kernel,
+        ["constant", Kernel::Constant],
+        ["cone", Kernel::Cone],
+        ["epanechnikov", Kernel::Epanechnikov]
+    ),
+    Knob {
+        name: "splatter.photons",
+        expected: "above 0: photons under a kernel",
+        get: |s| s.density_values().0.to_string(),
+        set: |s, v| {
+            *s.density().0 = v.parse().ok()?;
+            Some(())
+        },
+        is_valid: |s| s.is_fixed() || (s.density_values().0 > 0.0 && s.density_values().0.is_finite()),
+    },
+    Knob {
+        name: "splatter.lowest_density",
+        expected: "above 0, at most splatter.highest_density",
+        get: |s| s.density_values().1[0].to_string(),
+        set: |s, v| {
+            s.density().1[0] = v.parse().ok()?;
+            Some(())
+        },
+        is_valid: |s| s.is_fixed() || (s.density_values().1[0] > 0.0 && s.density_values().1[0] <= s.density_values().1[1]),
+    },
+    Knob {
+        name: "splatter.highest_density",
+        expected: "at least splatter.lowest_density",
+        get: |s| s.density_values().1[1].to_string(),
+        set: |s, v| {
+            s.density().1[1] = v.parse().ok()?;
+            Some(())
+        },
+        is_valid: |s| s.is_fixed() || (s.density_values().1[1].is_finite() && s.density_values().1[0] <= s.density_values().1[1]),
+    },
+    Knob {
+        name: "splatter.fixed_radius",
+        expected: "above 0: share of the region's radius (0: by density)",
+        get: |s| match s.splatter.bandwidth {
+            Bandwidth::Fixed(share) => share.to_string(),
+            Bandwidth::Density { .. } => "0".into(),
+        },
+        set: |s, v| {
+            let share: f32 = v.parse().ok()?;
+            if share == 0.0 {
+                s.density();
+            } else {
+                s.splatter.bandwidth = Bandwidth::Fixed(share);
+            }
+            Some(())
+        },
+        is_valid: |s| match s.splatter.bandwidth {
+            Bandwidth::Fixed(share) => share > 0.0 && share.is_finite(),
+            Bandwidth::Density { .. } => true,
+        },
+    },
+    field!("splatter.max_radius", "above 0, in pixels", splatter.max_radius, |v| v > 0.0),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_entry_can_be_read_back_into_its_preset() {
+        for name in ["fast", "balanced", "accurate"] {
+            let preset = Settings::preset(name).unwrap();
+            preset.validate().unwrap();
+            let mut copy = Settings::balanced();
+            for (key, value) in preset.entries() {
+                copy.set(key, &value).unwrap();
+            }
+            assert_eq!(copy, preset, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_fixed_radius_replaces_density_and_gives_way_to_it() {
+        let mut settings = Settings::balanced();
+        settings.set("splatter.fixed_radius", "0.05").unwrap();
+        assert_eq!(settings.splatter.bandwidth, Bandwidth::Fixed(0.05));
+        settings.validate().unwrap();
+        settings.set("splatter.photons", "30").unwrap();
+        assert_eq!(settings.density_values().0, 30.0);
+    }
+
+    #[test]
+    fn unknown_names_and_bad_values_say_what_would_do() {
+        let mut settings = Settings::balanced();
+        let error = settings.set("photon", "1").unwrap_err().to_string();
+        assert!(error.contains("photons") && error.contains("tracer.iterations"), "{error}");
+        let error = settings.set("bounces", "65").unwrap_err().to_string();
+        assert!(error.contains("0 to 64"), "{error}");
+        assert!(settings.set("splatter.kernel", "round").is_err());
+        assert!(settings.set("photons", "many").is_err());
+        assert_eq!(settings, Settings::balanced(), "a refused value changes nothing");
+        settings.env_map_count = 43;
+        assert!(matches!(settings.validate(), Err(Error::InvalidSetting { key, .. }) if key == "env_maps.count"));
+    }
+}

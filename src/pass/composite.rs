@@ -1,0 +1,142 @@
+//! Puts light together: L = L_e + ρ/π · (E_direct + E_indirect), scaled back to world units.
+//!
+//! Inputs: [`GBuffer`], two [`Irradiance`]s. Output: [`Radiance`]. Cost: one full-screen pass. Source: Larsen 2004,
+//! chapter 13; the 1/π that is missing from Yao et al., soft shadows and image-space photon mapping, Eq. 1. Limits: every
+//! surface is Lambertian.
+
+use super::full_screen::{FullScreen, FullScreenResources};
+use crate::gpu::Slot;
+use crate::resource::{GBuffer, Irradiance, Radiance};
+use crate::{Error, Timestamps, wgsl};
+
+pub(crate) mod gpu {
+    use bytemuck::{Pod, Zeroable};
+
+    /// Twin of `Params` in `shaders/pass/composite.wgsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Params {
+        pub(crate) output_scale: f32,
+        pub(crate) direct_weight: f32,
+        pub(crate) indirect_weight: f32,
+        pub(crate) emission_weight: f32,
+    }
+}
+
+/// Which parts of the light to show, and how bright.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CompositeSettings {
+    /// [`UnitFrame::output_scale`](crate::scene::UnitFrame::output_scale): world radiance, times pre-exposure, that one
+    /// unit of the unit frame stands for.
+    pub output_scale: f32,
+    /// Factor of direct light; 0 leaves it out.
+    pub direct: f32,
+    /// Factor of indirect light.
+    pub indirect: f32,
+    /// Factor of emission.
+    pub emission: f32,
+}
+
+impl Default for CompositeSettings {
+    fn default() -> Self {
+        Self {
+            output_scale: 1.0,
+            direct: 1.0,
+            indirect: 1.0,
+            emission: 1.0,
+        }
+    }
+}
+
+/// The pass.
+#[derive(Debug)]
+pub struct Composite {
+    pass: FullScreen,
+}
+
+/// Uniforms and bind groups for one view.
+#[derive(Debug)]
+pub struct CompositeResources {
+    inner: FullScreenResources,
+}
+
+/// What a frame gives it.
+#[derive(Debug, Clone, Copy)]
+pub struct CompositeInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// Surfaces. Its view must be set.
+    pub g_buffer: &'a GBuffer,
+    /// Light straight from sources.
+    pub direct: &'a Irradiance,
+    /// Light by way of other surfaces.
+    pub indirect: &'a Irradiance,
+    /// Written; of the format that the pass was made for.
+    pub radiance: &'a Radiance,
+    /// What to show.
+    pub settings: &'a CompositeSettings,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+impl Composite {
+    /// The pass for targets of `format`: `rgba32float` unscaled, or a narrower one with a pre-exposure.
+    pub fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
+        let slots = [
+            Slot::Uniform,
+            Slot::Uniform,
+            Slot::Texture,
+            Slot::Texture,
+            Slot::Texture,
+            Slot::Texture,
+        ];
+        Self {
+            pass: FullScreen::new(device, "lightfall::Composite", wgsl::COMPOSITE, &slots, &[format]),
+        }
+    }
+
+    /// Records the sum.
+    pub fn record(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut CompositeResources,
+        inputs: &CompositeInputs<'_>,
+    ) {
+        let params = gpu::Params {
+            output_scale: inputs.settings.output_scale,
+            direct_weight: inputs.settings.direct,
+            indirect_weight: inputs.settings.indirect,
+            emission_weight: inputs.settings.emission,
+        };
+        inputs
+            .queue
+            .write_buffer(&resources.inner.params, 0, bytemuck::bytes_of(&params));
+        let views = inputs.g_buffer.views();
+        let bound = [
+            inputs.g_buffer.view_buffer().into(),
+            (&views.base_color).into(),
+            (&views.emission).into(),
+            inputs.direct.view().into(),
+            inputs.indirect.view().into(),
+        ];
+        let targets = [inputs.radiance.view()];
+        self.pass
+            .record(encoder, &mut resources.inner, &bound, &targets, inputs.timestamps);
+    }
+}
+
+impl CompositeResources {
+    /// Resources on this device.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] if the device grants next to nothing.
+    pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
+        let inner = FullScreenResources::new::<gpu::Params>(device, "lightfall::Composite::params")?;
+        Ok(Self { inner })
+    }
+
+    /// Bytes allocated.
+    pub fn memory_use(&self) -> u64 {
+        self.inner.params.size()
+    }
+}

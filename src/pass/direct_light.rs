@@ -1,0 +1,137 @@
+//! Direct irradiance with hard shadows, deferred over the G-buffer.
+//!
+//! Inputs: [`GBuffer`], [`Lights`], [`ShadowMaps`]. Output: [`Irradiance`] (`rgba32float`). Cost: pixels × lights that
+//! face them, one texel fetch each. A receiver is lit where it lies no further than the plane of the surface that its
+//! shadow-map texel holds, so flat surfaces need no bias. Source: deferred shading as in Yao et al. 2010, section 7.
+//! Limits: the extent of a light is ignored; geometry further than two region radii towards a directional light does not
+//! shade.
+
+use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
+use crate::resource::{GBuffer, Irradiance, Lights, ShadowMaps};
+use crate::{Error, Timestamps, wgsl};
+
+pub(crate) mod gpu {
+    use bytemuck::{Pod, Zeroable};
+
+    /// Twin of `Params` in `shaders/pass/direct_light.wgsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Params {
+        pub(crate) light_count: u32,
+        pub(crate) shadow_map_size: u32,
+    }
+}
+
+/// The pass.
+#[derive(Debug)]
+pub struct DirectLight {
+    device: wgpu::Device,
+    layout: wgpu::BindGroupLayout,
+    light: wgpu::ComputePipeline,
+}
+
+/// Uniforms and bind groups for one view.
+#[derive(Debug)]
+pub struct DirectLightResources {
+    params: wgpu::Buffer,
+    groups: BindGroupCache,
+}
+
+/// What a frame gives it.
+#[derive(Debug, Clone, Copy)]
+pub struct DirectLightInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// Surfaces to light. Its view must be set.
+    pub g_buffer: &'a GBuffer,
+    /// Sources.
+    pub lights: &'a Lights,
+    /// What they see.
+    pub shadow_maps: &'a ShadowMaps,
+    /// Written; `rgba32float` of the G-buffer's size.
+    pub irradiance: &'a Irradiance,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+impl DirectLight {
+    /// The pass on this device. Needs no features and no more than default limits.
+    pub fn new(device: &wgpu::Device) -> Self {
+        let slots = [
+            Slot::Uniform,
+            Slot::Uniform,
+            Slot::Texture,
+            Slot::Texture,
+            Slot::Texture,
+            Slot::Storage,
+            Slot::UintArray,
+            Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
+        ];
+        let layout = device::layout(device, "lightfall::DirectLight", wgpu::ShaderStages::COMPUTE, &slots);
+        let light = device::compute_pipeline(
+            device,
+            &ComputeSpec {
+                label: "lightfall::DirectLight::light",
+                source: wgsl::DIRECT_LIGHT,
+                entry_point: "light_pixels",
+                layouts: &[&layout],
+                constants: &[],
+            },
+        );
+        Self {
+            device: device.clone(),
+            layout,
+            light,
+        }
+    }
+
+    /// Records the lighting.
+    pub fn record(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut DirectLightResources,
+        inputs: &DirectLightInputs<'_>,
+    ) {
+        let params = gpu::Params {
+            light_count: inputs.lights.count(),
+            shadow_map_size: inputs.shadow_maps.size(),
+        };
+        inputs.queue.write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        let views = inputs.g_buffer.views();
+        let bound = [
+            (&resources.params).into(),
+            inputs.g_buffer.view_buffer().into(),
+            (&views.depth).into(),
+            (&views.normal).into(),
+            (&views.base_color).into(),
+            inputs.lights.buffer().into(),
+            inputs.shadow_maps.view().into(),
+            inputs.irradiance.view().into(),
+        ];
+        let label = "lightfall::DirectLight";
+        let group = resources.groups.get(&self.device, label, &self.layout, &bound);
+        let [width, height] = inputs.g_buffer.size();
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(&self.light);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(width.div_ceil(8), height.div_ceil(8), 1);
+    }
+}
+
+impl DirectLightResources {
+    /// Resources on this device.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] if the device grants next to nothing.
+    pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
+        Ok(Self {
+            params: device::uniform_buffer::<gpu::Params>(device, "lightfall::DirectLight::params")?,
+            groups: BindGroupCache::default(),
+        })
+    }
+
+    /// Bytes allocated.
+    pub fn memory_use(&self) -> u64 {
+        self.params.size()
+    }
+}

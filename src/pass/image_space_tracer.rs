@@ -1,0 +1,182 @@
+//! The photon walk through environment maps: scatter, trace, store.
+//!
+//! Inputs: [`EnvMaps`], [`Photons`] with hop 0. Output: [`Photons`], hops 1 to its number of bounces. Cost: photons ×
+//! bounces × maps × (iterations + 2) texel fetches. Source: Yao et al. 2010, sections 3 and 5. Limits: surfaces scatter
+//! as Lambertian ones; geometry that no map sees lets rays pass or lose them; what became of every ray is in the photon
+//! records ([`TraceStatistics`](super::TraceStatistics) adds them up).
+
+use super::dispatch_64;
+use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
+use crate::resource::{EnvMaps, Photons};
+use crate::{Error, Timestamps, wgsl};
+
+pub(crate) mod gpu {
+    use bytemuck::{Pod, Zeroable};
+
+    /// Twin of `Params` in `shaders/pass/image_space_tracer/walk_photons.wgsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Params {
+        pub(crate) photon_count: u32,
+        pub(crate) bounces: u32,
+        pub(crate) roulette_from: u32,
+        pub(crate) sample_offset: u32,
+        pub(crate) map_count: u32,
+        pub(crate) map_size: u32,
+        pub(crate) iterations: u32,
+        pub(crate) epsilon: f32,
+        pub(crate) row: u32,
+    }
+}
+
+/// When a point that a map offers counts as hit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum HitTest {
+    /// The paper's: the stored point lies within a small angle of the ray, ε = 1 − cos ≤ 0.001; nearest of all maps.
+    Angle,
+    /// The ray meets the texel's plane from the front and within 1.5 texels of its middle; maps that see the ray's origin
+    /// go first. As many fetches, and far fewer false hits.
+    #[default]
+    TexelPlane,
+}
+
+/// Speed against accuracy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImageSpaceTracerSettings {
+    /// Acceptance of hits.
+    pub hit_test: HitTest,
+    /// Steps of false position for each map and ray, 1 to 32; the paper uses 5. More cost a fetch each and find a few
+    /// more crossings.
+    pub iterations: u32,
+    /// Scatterings before Russian roulette may end a path. Lower is faster and noisier.
+    pub roulette_from: u32,
+}
+
+impl Default for ImageSpaceTracerSettings {
+    fn default() -> Self {
+        Self {
+            hit_test: HitTest::TexelPlane,
+            iterations: 8,
+            roulette_from: 4,
+        }
+    }
+}
+
+/// ε of Yao et al. 2010, section 8.
+const PAPER_EPSILON: f32 = 0.001;
+
+/// The pass.
+#[derive(Debug)]
+pub struct ImageSpaceTracer {
+    device: wgpu::Device,
+    layout: wgpu::BindGroupLayout,
+    walk_by_angle: wgpu::ComputePipeline,
+    walk_by_plane: wgpu::ComputePipeline,
+}
+
+/// Uniforms and bind groups.
+#[derive(Debug)]
+pub struct ImageSpaceTracerResources {
+    params: wgpu::Buffer,
+    groups: BindGroupCache,
+}
+
+/// What a frame gives it.
+#[derive(Debug, Clone, Copy)]
+pub struct ImageSpaceTracerInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// What photons meet.
+    pub env_maps: &'a EnvMaps,
+    /// Hop 0 is read, the others are written.
+    pub photons: &'a Photons,
+    /// As for the emitter.
+    pub sample_offset: u32,
+    /// How to trace.
+    pub settings: &'a ImageSpaceTracerSettings,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+impl ImageSpaceTracer {
+    /// The pass on this device. Needs no features and no more than default limits.
+    pub fn new(device: &wgpu::Device) -> Self {
+        let slots = [Slot::Uniform, Slot::UintArray, Slot::Storage, Slot::StorageMut];
+        let layout = device::layout(device, "lightfall::ImageSpaceTracer", wgpu::ShaderStages::COMPUTE, &slots);
+        let pipeline = |hit_test: f64| {
+            device::compute_pipeline(
+                device,
+                &ComputeSpec {
+                    label: "lightfall::ImageSpaceTracer::walk",
+                    source: wgsl::IMAGE_SPACE_TRACER,
+                    entry_point: "walk_photons",
+                    layouts: &[&layout],
+                    constants: &[("hit_test", hit_test)],
+                },
+            )
+        };
+        let (walk_by_angle, walk_by_plane) = (pipeline(0.0), pipeline(1.0));
+        Self {
+            device: device.clone(),
+            layout,
+            walk_by_angle,
+            walk_by_plane,
+        }
+    }
+
+    /// Records the walk.
+    pub fn record(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut ImageSpaceTracerResources,
+        inputs: &ImageSpaceTracerInputs<'_>,
+    ) {
+        let (groups, row) = dispatch_64(inputs.photons.count());
+        let settings = inputs.settings;
+        let params = gpu::Params {
+            photon_count: inputs.photons.count(),
+            bounces: inputs.photons.bounces(),
+            roulette_from: settings.roulette_from,
+            sample_offset: inputs.sample_offset,
+            map_count: inputs.env_maps.centers().len() as u32,
+            map_size: inputs.env_maps.size(),
+            iterations: settings.iterations.clamp(1, 32),
+            epsilon: PAPER_EPSILON,
+            row,
+        };
+        inputs.queue.write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        let bound = [
+            (&resources.params).into(),
+            inputs.env_maps.view().into(),
+            inputs.env_maps.centers_buffer().into(),
+            inputs.photons.buffer().into(),
+        ];
+        let label = "lightfall::ImageSpaceTracer";
+        let group = resources.groups.get(&self.device, label, &self.layout, &bound);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(match settings.hit_test {
+            HitTest::Angle => &self.walk_by_angle,
+            HitTest::TexelPlane => &self.walk_by_plane,
+        });
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
+    }
+}
+
+impl ImageSpaceTracerResources {
+    /// Resources on this device.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] if the device grants next to nothing.
+    pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
+        Ok(Self {
+            params: device::uniform_buffer::<gpu::Params>(device, "lightfall::ImageSpaceTracer::params")?,
+            groups: BindGroupCache::default(),
+        })
+    }
+
+    /// Bytes allocated.
+    pub fn memory_use(&self) -> u64 {
+        self.params.size()
+    }
+}

@@ -1,0 +1,58 @@
+//! Layer 3: the passes, one technique per file, all of one silhouette.
+//!
+//! A pass holds pipelines and is made once per device; its `…Resources` hold what lives across frames; its `…Inputs` are
+//! borrowed for one frame; `record` writes commands into the host's encoder and neither submits nor waits. A pass knows
+//! the resources at its seams and no other pass.
+
+mod accumulator;
+mod capture;
+mod composite;
+mod direct_light;
+mod env_map_capture;
+mod env_map_selector;
+mod full_screen;
+mod g_buffer_capture;
+mod image_space_tracer;
+mod photon_emitter;
+mod photon_splatter;
+mod shadow_map_capture;
+mod tone_map;
+mod trace_statistics;
+
+pub use accumulator::{Accumulator, AccumulatorInputs, AccumulatorResources};
+pub use composite::{Composite, CompositeInputs, CompositeResources, CompositeSettings};
+pub use direct_light::{DirectLight, DirectLightInputs, DirectLightResources};
+pub use env_map_capture::{EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources};
+pub use env_map_selector::{
+    EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings, Sight,
+};
+pub use g_buffer_capture::{GBufferCapture, GBufferCaptureInputs};
+pub use image_space_tracer::{
+    HitTest, ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, ImageSpaceTracerSettings,
+};
+pub use photon_emitter::{PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources};
+pub use photon_splatter::{
+    Bandwidth, Kernel, PhotonSplatter, PhotonSplatterConfig, PhotonSplatterInputs, PhotonSplatterResources,
+    PhotonSplatterSettings, SplatShape,
+};
+pub use shadow_map_capture::{ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources};
+pub use tone_map::{ToneCurve, ToneMap, ToneMapInputs, ToneMapResources, ToneMapSettings};
+pub use trace_statistics::{HopStatistics, TraceStatistics, TraceStatisticsInputs, TraceStatisticsResources};
+
+/// Workgroups for `count` invocations of 64, and the invocations in a row of the dispatch.
+fn dispatch_64(count: u32) -> ([u32; 2], u32) {
+    let groups = crate::gpu::dispatch_size(count.div_ceil(64));
+    (groups, groups[0] * 64)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn dispatches_cover_every_invocation_within_the_limit() {
+        for count in [0, 1, 64, 65, 4_194_240, 4_194_241, 100_000_000] {
+            let ([x, y], row) = super::dispatch_64(count);
+            assert!(x <= 65_535 && y <= 65_535);
+            assert!(u64::from(row) * u64::from(y) >= u64::from(count));
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Emits photons from every light and stores where they first land: hop 0 of [`Photons`].
+//!
+//! Inputs: [`Lights`], [`ShadowMaps`]. Output: [`Photons`], hop 0. Cost: proportional to the number of photons, one
+//! texel fetch each. Directions follow the Halton sequence; first hits are looked up in the light's reflective shadow map
+//! (Yao et al. 2010, section 7). Limits: the extent of a light is not sampled.
+
+use super::dispatch_64;
+use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
+use crate::resource::{Lights, Photons, ShadowMaps};
+use crate::{Error, Timestamps, wgsl};
+
+pub(crate) mod gpu {
+    use bytemuck::{Pod, Zeroable};
+
+    /// Twin of `Params` in `shaders/pass/photon_emitter.wgsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Params {
+        pub(crate) photon_count: u32,
+        pub(crate) light_count: u32,
+        pub(crate) sample_offset: u32,
+        pub(crate) shadow_map_size: u32,
+        pub(crate) row: u32,
+    }
+}
+
+/// The pass.
+#[derive(Debug)]
+pub struct PhotonEmitter {
+    device: wgpu::Device,
+    layout: wgpu::BindGroupLayout,
+    emit: wgpu::ComputePipeline,
+}
+
+/// Uniforms and bind groups.
+#[derive(Debug)]
+pub struct PhotonEmitterResources {
+    params: wgpu::Buffer,
+    groups: BindGroupCache,
+}
+
+/// What a frame gives it.
+#[derive(Debug, Clone, Copy)]
+pub struct PhotonEmitterInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// Where photons begin.
+    pub lights: &'a Lights,
+    /// Where they first land.
+    pub shadow_maps: &'a ShadowMaps,
+    /// Hop 0 is written.
+    pub photons: &'a Photons,
+    /// First index into the random sequence: constant in real time, so that nothing flickers; advanced by the number of
+    /// photons per frame when accumulating.
+    pub sample_offset: u32,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+impl PhotonEmitter {
+    /// The pass on this device. Needs no features and no more than default limits.
+    pub fn new(device: &wgpu::Device) -> Self {
+        let slots = [Slot::Uniform, Slot::Storage, Slot::UintArray, Slot::StorageMut];
+        let layout = device::layout(device, "lightfall::PhotonEmitter", wgpu::ShaderStages::COMPUTE, &slots);
+        let emit = device::compute_pipeline(
+            device,
+            &ComputeSpec {
+                label: "lightfall::PhotonEmitter::emit",
+                source: wgsl::PHOTON_EMITTER,
+                entry_point: "emit_photons",
+                layouts: &[&layout],
+                constants: &[],
+            },
+        );
+        Self {
+            device: device.clone(),
+            layout,
+            emit,
+        }
+    }
+
+    /// Records the emission.
+    pub fn record(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut PhotonEmitterResources,
+        inputs: &PhotonEmitterInputs<'_>,
+    ) {
+        let (groups, row) = dispatch_64(inputs.photons.count());
+        let params = gpu::Params {
+            photon_count: inputs.photons.count(),
+            light_count: inputs.lights.count(),
+            sample_offset: inputs.sample_offset,
+            shadow_map_size: inputs.shadow_maps.size(),
+            row,
+        };
+        inputs.queue.write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        let bound = [
+            (&resources.params).into(),
+            inputs.lights.buffer().into(),
+            inputs.shadow_maps.view().into(),
+            inputs.photons.buffer().into(),
+        ];
+        let label = "lightfall::PhotonEmitter";
+        let group = resources.groups.get(&self.device, label, &self.layout, &bound);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(&self.emit);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
+    }
+}
+
+impl PhotonEmitterResources {
+    /// Resources on this device.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] if the device grants next to nothing.
+    pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
+        Ok(Self {
+            params: device::uniform_buffer::<gpu::Params>(device, "lightfall::PhotonEmitter::params")?,
+            groups: BindGroupCache::default(),
+        })
+    }
+
+    /// Bytes allocated.
+    pub fn memory_use(&self) -> u64 {
+        self.params.size()
+    }
+}

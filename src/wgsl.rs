@@ -1,0 +1,141 @@
+//! Shader sources, composed from plain WGSL files: the pass's own file first, so that diagnostics keep its line numbers.
+
+macro_rules! compose {
+    ($($path:literal),+ $(,)?) => {
+        concat!($(include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $path)), "\n"),+)
+    };
+}
+
+/// For a host's own capture shader: write `surface_texel_pack(surface_texel_at(position, normal, reflectance, eye,
+/// front_facing))` to an `rgba32uint` target.
+///
+/// `position` is in the unit frame, `normal` the geometric one (of either sign; `surface_capture_normal(position)` takes
+/// it from derivatives), `reflectance` linear RGB in [0, 1], `eye` is
+/// [`CaptureView::eye`](crate::resource::CaptureView::eye). Declares no bindings; its functions begin with
+/// `surface_texel_`, `surface_capture_`, `octahedral_` and `reflectance_`.
+pub const CAPTURE: &str = compose![
+    "common/surface_texel.wgsl",
+    "common/surface_capture.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+];
+
+pub(crate) const MESH_GEOMETRY: &str = compose![
+    "resource/mesh_geometry.wgsl",
+    "common/surface_texel.wgsl",
+    "common/surface_capture.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+];
+
+pub(crate) const PHOTON_EMITTER: &str = compose![
+    "pass/photon_emitter.wgsl",
+    "common/light.wgsl",
+    "common/photon.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+    "common/random.wgsl",
+    "common/halton.wgsl",
+    "common/hash.wgsl",
+];
+
+pub(crate) const IMAGE_SPACE_TRACER: &str = compose![
+    "pass/image_space_tracer/walk_photons.wgsl",
+    "pass/image_space_tracer/trace_ray.wgsl",
+    "common/env_map.wgsl",
+    "common/photon.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+    "common/random.wgsl",
+    "common/halton.wgsl",
+    "common/hash.wgsl",
+];
+
+pub(crate) const PHOTON_SPLATTER_TILED: &str = compose![
+    "pass/photon_splatter/tiled.wgsl",
+    "pass/photon_splatter/splat.wgsl",
+    "common/photon.wgsl",
+    "common/g_buffer.wgsl",
+    "common/octahedral.wgsl",
+];
+
+pub(crate) const PHOTON_SPLATTER_QUADS: &str = compose![
+    "pass/photon_splatter/quads.wgsl",
+    "pass/photon_splatter/splat.wgsl",
+    "common/photon.wgsl",
+    "common/g_buffer.wgsl",
+    "common/octahedral.wgsl",
+    "common/sampling.wgsl",
+];
+
+pub(crate) const DIRECT_LIGHT: &str = compose![
+    "pass/direct_light.wgsl",
+    "common/light.wgsl",
+    "common/g_buffer.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+];
+
+pub(crate) const COMPOSITE: &str = compose![
+    "pass/composite.wgsl",
+    "common/full_screen.wgsl",
+    "common/g_buffer.wgsl",
+    "common/octahedral.wgsl",
+];
+
+pub(crate) const ACCUMULATOR: &str = compose!["pass/accumulator.wgsl", "common/full_screen.wgsl"];
+
+pub(crate) const TONE_MAP: &str = compose!["pass/tone_map.wgsl", "common/full_screen.wgsl"];
+
+pub(crate) const ENV_MAP_SELECTOR: &str = compose![
+    "pass/env_map_selector.wgsl",
+    "common/env_map.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+];
+
+pub(crate) const TRACE_STATISTICS: &str = compose![
+    "pass/trace_statistics.wgsl",
+    "common/photon.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+];
+
+/// Every composed module, by the name of its pass; for validation and for tools.
+#[doc(hidden)]
+pub const MODULES: [(&str, &str); 11] = [
+    ("MeshGeometry", MESH_GEOMETRY),
+    ("PhotonEmitter", PHOTON_EMITTER),
+    ("ImageSpaceTracer", IMAGE_SPACE_TRACER),
+    ("PhotonSplatter tiled", PHOTON_SPLATTER_TILED),
+    ("PhotonSplatter quads", PHOTON_SPLATTER_QUADS),
+    ("DirectLight", DIRECT_LIGHT),
+    ("Composite", COMPOSITE),
+    ("Accumulator", ACCUMULATOR),
+    ("ToneMap", TONE_MAP),
+    ("EnvMapSelector", ENV_MAP_SELECTOR),
+    ("TraceStatistics", TRACE_STATISTICS),
+];
+
+/// Functions of `shaders/common/` that tests compare with `f64` twins.
+#[doc(hidden)]
+pub const COMMON: &str = compose![
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+    "common/random.wgsl",
+    "common/halton.wgsl",
+    "common/hash.wgsl",
+];
