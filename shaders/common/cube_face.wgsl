@@ -14,18 +14,34 @@ fn cube_face_right(face: u32) -> vec3f {
     return cross(cube_face_forward(face), cube_face_up(face));
 }
 
-// The face that a direction of any length above zero points through.
-fn cube_face_of(d: vec3f) -> u32 {
-    let a = abs(d);
-    if a.x >= a.y && a.x >= a.z {
-        return select(0u, 1u, d.x < 0.0);
-    }
-    if a.y >= a.z {
-        return select(2u, 3u, d.y < 0.0);
-    }
-    return select(4u, 5u, d.z < 0.0);
+struct CubePoint {
+    face: u32,
+    uv: vec2f,
 }
 
+// Where a direction of any length above zero leaves the cube.
+fn cube_face_point(d: vec3f) -> CubePoint {
+    let a = abs(d);
+    var face: u32;
+    var st: vec2f;
+    var major: f32;
+    if a.x >= a.y && a.x >= a.z {
+        face = select(0u, 1u, d.x < 0.0);
+        st = vec2f(select(d.z, -d.z, d.x < 0.0), d.y);
+        major = a.x;
+    } else if a.y >= a.z {
+        face = select(2u, 3u, d.y < 0.0);
+        st = vec2f(select(d.x, -d.x, d.y < 0.0), d.z);
+        major = a.y;
+    } else {
+        face = select(4u, 5u, d.z < 0.0);
+        st = vec2f(select(-d.x, d.x, d.z < 0.0), d.y);
+        major = a.z;
+    }
+    return CubePoint(face, vec2f(0.5, 0.5) + vec2f(0.5, -0.5) * st / major);
+}
+
+// The same point as seen through a given face; meaningful in front of it.
 fn cube_face_uv(face: u32, d: vec3f) -> vec2f {
     let scaled = d / dot(d, cube_face_forward(face));
     return vec2f(0.5 + 0.5 * dot(scaled, cube_face_right(face)), 0.5 - 0.5 * dot(scaled, cube_face_up(face)));

@@ -16,14 +16,14 @@ fn env_map_load(map: u32, face: u32, at: vec2u) -> vec4u {
 
 // Distance stored in direction d (any length above zero); 0: nothing there.
 fn env_map_distance(map: u32, d: vec3f, size: u32) -> f32 {
-    let face = cube_face_of(d);
-    return bitcast<f32>(env_map_load(map, face, cube_face_texel(cube_face_uv(face, d), size)).x);
+    let point = cube_face_point(d);
+    return bitcast<f32>(env_map_load(map, point.face, cube_face_texel(point.uv, size)).x);
 }
 
 fn env_map_texel(map: u32, d: vec3f, size: u32) -> EnvMapTexel {
-    let face = cube_face_of(d);
-    let at = cube_face_texel(cube_face_uv(face, d), size);
+    let point = cube_face_point(d);
+    let at = cube_face_texel(point.uv, size);
     let middle = vec2f(at) + 0.5;
-    let direction = normalize(cube_face_direction(face, middle / f32(size)));
-    return EnvMapTexel(surface_texel_unpack(env_map_load(map, face, at)), direction, face, middle);
+    let direction = normalize(cube_face_direction(point.face, middle / f32(size)));
+    return EnvMapTexel(surface_texel_unpack(env_map_load(map, point.face, at)), direction, point.face, middle);
 }

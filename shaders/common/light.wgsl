@@ -53,8 +53,8 @@ fn light_ray(light: Light, direction: vec3f, offset: vec2f) -> LightRay {
         let uv = light_layer_uv(dot(direction, light.right) * scale, dot(direction, light.up) * scale);
         return LightRay(light.position, direction, light.first_layer, uv);
     }
-    let face = cube_face_of(direction);
-    return LightRay(light.position, direction, light.first_layer + face, cube_face_uv(face, direction));
+    let point = cube_face_point(direction);
+    return LightRay(light.position, direction, light.first_layer + point.face, point.uv);
 }
 
 // The ray of light that would reach a point.

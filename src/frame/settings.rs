@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::pass::{
-    Bandwidth, EnvMapSelectorSettings, HitTest, ImageSpaceTracerSettings, Kernel, PhotonSplatterConfig,
-    PhotonSplatterSettings, SplatShape,
+    Bandwidth, EnvMapSelectorSettings, ImageSpaceTracerSettings, Kernel, PhotonSplatterConfig,
+    PhotonSplatterSettings, SplatShape, TraceMethod,
 };
 
 /// Most scatterings of a path.
@@ -221,11 +221,12 @@ const KNOBS: &[Knob] = &[
     field!("selector.back_face_limit", "0 to 1", selector.back_face_limit, |v| (0.0..=1.0).contains(&v)),
     field!("selector.clearance", "0 to 1", selector.clearance, |v| (0.0..=1.0).contains(&v)),
     choice!(
-        "tracer.hit_test",
-        "angle or texel-plane",
-        tracer.hit_test,
-        ["angle", HitTest::Angle],
-        ["texel-plane", HitTest::TexelPlane]
+        "tracer.method",
+        "paper, plane or ordered-march",
+        tracer.method,
+        ["paper", TraceMethod::Paper],
+        ["plane", TraceMethod::Plane],
+        ["ordered-march", TraceMethod::OrderedMarch]
     ),
     field!("tracer.iterations", "1 to 32", tracer.iterations, |v| (1..=32).contains(&v)),
     field!("tracer.roulette_from", "1 or more", tracer.roulette_from, |v| v >= 1),

@@ -1,7 +1,8 @@
 //! The photon walk through environment maps: scatter, trace, store.
 //!
 //! Inputs: [`EnvMaps`], [`Photons`] with hop 0. Output: [`Photons`], hops 1 to its number of bounces. Cost: photons ×
-//! bounces × maps × (iterations + 2) texel fetches. Source: Yao et al. 2010, sections 3 and 5. Limits: surfaces scatter
+//! bounces × fetches a ray: maps × (iterations + 2) by false position, about 30 by the ordered march however many maps
+//! there are. Source: Yao et al. 2010, sections 3 and 5; the march is this crate's. Limits: surfaces scatter
 //! as Lambertian ones; geometry that no map sees lets rays pass or lose them; what became of every ray is in the photon
 //! records ([`TraceStatistics`](super::TraceStatistics) adds them up).
 
@@ -29,24 +30,28 @@ pub(crate) mod gpu {
     }
 }
 
-/// When a point that a map offers counts as hit.
+/// How a ray is searched for in the maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum HitTest {
-    /// The paper's: the stored point lies within a small angle of the ray, ε = 1 − cos ≤ 0.001; nearest of all maps.
-    Angle,
-    /// The ray meets the texel's plane from the front and within 1.5 texels of its middle; maps that see the ray's origin
-    /// go first. As many fetches, and far fewer false hits.
+pub enum TraceMethod {
+    /// The paper's: false position in every map; a stored point within a small angle of the ray (ε = 1 − cos ≤ 0.001) is
+    /// a hit; nearest of all maps.
+    Paper,
+    /// False position; a hit meets the texel's plane from the front and within 1.5 texels of its middle; only maps that
+    /// see the ray's origin are asked. As many fetches as the paper's, fewer false hits.
+    Plane,
+    /// Maps in order of distance, marched in equal angles, each continuing where the one before knew no further; plane
+    /// test. Most rays end in the first or second map.
     #[default]
-    TexelPlane,
+    OrderedMarch,
 }
 
 /// Speed against accuracy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImageSpaceTracerSettings {
-    /// Acceptance of hits.
-    pub hit_test: HitTest,
+    /// How rays are searched for.
+    pub method: TraceMethod,
     /// Steps of false position for each map and ray, 1 to 32; the paper uses 5. More cost a fetch each and find a few
-    /// more crossings.
+    /// more crossings. The ordered march does not use it.
     pub iterations: u32,
     /// Scatterings before Russian roulette may end a path. Lower is faster and noisier.
     pub roulette_from: u32,
@@ -55,7 +60,7 @@ pub struct ImageSpaceTracerSettings {
 impl Default for ImageSpaceTracerSettings {
     fn default() -> Self {
         Self {
-            hit_test: HitTest::TexelPlane,
+            method: TraceMethod::OrderedMarch,
             iterations: 8,
             roulette_from: 4,
         }
@@ -70,8 +75,8 @@ const PAPER_EPSILON: f32 = 0.001;
 pub struct ImageSpaceTracer {
     device: wgpu::Device,
     layout: wgpu::BindGroupLayout,
-    walk_by_angle: wgpu::ComputePipeline,
-    walk_by_plane: wgpu::ComputePipeline,
+    /// By [`TraceMethod`].
+    walks: [wgpu::ComputePipeline; 3],
 }
 
 /// Uniforms and bind groups.
@@ -103,7 +108,7 @@ impl ImageSpaceTracer {
     pub fn new(device: &wgpu::Device) -> Self {
         let slots = [Slot::Uniform, Slot::UintArray, Slot::Storage, Slot::StorageMut];
         let layout = device::layout(device, "lightfall::ImageSpaceTracer", wgpu::ShaderStages::COMPUTE, &slots);
-        let pipeline = |hit_test: f64| {
+        let walk = |method: TraceMethod| {
             device::compute_pipeline(
                 device,
                 &ComputeSpec {
@@ -111,16 +116,15 @@ impl ImageSpaceTracer {
                     source: wgsl::IMAGE_SPACE_TRACER,
                     entry_point: "walk_photons",
                     layouts: &[&layout],
-                    constants: &[("hit_test", hit_test)],
+                    constants: &[("method", f64::from(method as u32))],
                 },
             )
         };
-        let (walk_by_angle, walk_by_plane) = (pipeline(0.0), pipeline(1.0));
+        let walks = [TraceMethod::Paper, TraceMethod::Plane, TraceMethod::OrderedMarch].map(walk);
         Self {
             device: device.clone(),
             layout,
-            walk_by_angle,
-            walk_by_plane,
+            walks,
         }
     }
 
@@ -154,10 +158,7 @@ impl ImageSpaceTracer {
         let label = "lightfall::ImageSpaceTracer";
         let group = resources.groups.get(&self.device, label, &self.layout, &bound);
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
-        pass.set_pipeline(match settings.hit_test {
-            HitTest::Angle => &self.walk_by_angle,
-            HitTest::TexelPlane => &self.walk_by_plane,
-        });
+        pass.set_pipeline(&self.walks[settings.method as usize]);
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(groups[0], groups[1], 1);
     }

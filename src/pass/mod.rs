@@ -28,7 +28,7 @@ pub use env_map_selector::{
 };
 pub use g_buffer_capture::{GBufferCapture, GBufferCaptureInputs};
 pub use image_space_tracer::{
-    HitTest, ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, ImageSpaceTracerSettings,
+    ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, ImageSpaceTracerSettings, TraceMethod,
 };
 pub use photon_emitter::{PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources};
 pub use photon_splatter::{

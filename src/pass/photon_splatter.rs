@@ -450,7 +450,7 @@ fn working_sizes(slots: u32, size: [u32; 2]) -> [u64; 4] {
     let [columns, rows] = tiles_of(size);
     [
         slots * size_of::<gpu::Splat>() as u64,
-        slots * 4,
+        slots * 8,
         u64::from(columns) * u64::from(rows) * size_of::<gpu::Tile>() as u64,
         slots * u64::from(TILES_A_SIDE * TILES_A_SIDE) * 4,
     ]

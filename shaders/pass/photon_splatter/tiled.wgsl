@@ -37,8 +37,8 @@ struct Tile {
 @group(0) @binding(1) var<uniform> view: View;
 @group(0) @binding(2) var<storage, read> photons: array<Photon>;
 @group(0) @binding(3) var<storage, read_write> splats: array<Splat>;
-// Tile rectangle of a splat: column, row (12 bits each), columns, rows (4 bits each); 0: none
-@group(0) @binding(4) var<storage, read_write> rectangles: array<u32>;
+// Pixels that a splat may touch: first and last, x in the low 16 bits, y in the high; all ones first: none
+@group(0) @binding(4) var<storage, read_write> rectangles: array<vec2u>;
 @group(0) @binding(5) var<storage, read_write> tiles: array<Tile>;
 @group(0) @binding(6) var<storage, read_write> list: array<u32>;
 @group(0) @binding(7) var depth_texture: texture_2d<f32>;
@@ -69,18 +69,19 @@ fn projected_range(row: vec4f, w_row: vec4f, c: vec3f, h: f32) -> vec2f {
     return vec2f(qb - root, qb + root) / qa;
 }
 
-// First and last tile that the ball touches: x0, y0, x1, y1; x1 < x0 where it touches none.
-fn tile_range(c: vec3f, h: f32) -> vec4i {
+// First and last pixel that the ball touches: x0, y0, x1, y1; x1 < x0 or y1 < y0 where it touches none.
+fn pixel_range(c: vec3f, h: f32) -> vec4i {
     let x = projected_range(matrix_row(0u), matrix_row(3u), c, h);
     let y = projected_range(matrix_row(1u), matrix_row(3u), c, h);
     let size = vec2f(view.size);
-    // Half a pixel of slack for rounding: a tile too many costs nothing but time.
-    let low = vec2f(0.5 + 0.5 * x.x, 0.5 - 0.5 * y.y) * size - 0.5;
-    let high = vec2f(0.5 + 0.5 * x.y, 0.5 - 0.5 * y.x) * size + 0.5;
-    let tiles_in_all = vec2f(f32(params.tile_columns), f32(params.tile_rows));
-    let first_tile = clamp(floor(low / f32(TILE)), vec2f(0.0), tiles_in_all);
-    let last_tile = clamp(floor(high / f32(TILE)), vec2f(-1.0), tiles_in_all - 1.0);
-    return vec4i(vec4f(first_tile, last_tile));
+    // A pixel of slack for rounding: one too many costs nothing but time.
+    let low = vec2f(0.5 + 0.5 * x.x, 0.5 - 0.5 * y.y) * size - 1.0;
+    let high = vec2f(0.5 + 0.5 * x.y, 0.5 - 0.5 * y.x) * size + 1.0;
+    return vec4i(vec4f(clamp(floor(low), vec2f(0.0), size), clamp(floor(high), vec2f(-1.0), size - 1.0)));
+}
+
+fn is_empty(range: vec4i) -> bool {
+    return any(range.zw < range.xy);
 }
 
 // Largest radius at a point whose kernel covers `max_radius` pixels; 0 behind the eye.
@@ -89,6 +90,22 @@ fn radius_limit(p: vec3f) -> f32 {
     let x_scale = length(matrix_row(0u).xyz) * f32(view.size.x);
     let y_scale = length(matrix_row(1u).xyz) * f32(view.size.y);
     return max(0.0, params.max_radius * w / (0.5 * max(x_scale, y_scale)));
+}
+
+const NO_PIXELS: u32 = 0xffffffffu;
+
+fn pack_pixel(p: vec2i) -> u32 {
+    return u32(p.x) | (u32(p.y) << 16u);
+}
+
+fn unpack_pixels(packed: vec2u) -> vec4i {
+    return vec4i(vec4u(packed.x & 65535u, packed.x >> 16u, packed.y & 65535u, packed.y >> 16u));
+}
+
+// Tiles of a range of pixels, no more than `TILES_A_SIDE` a side.
+fn tiles_of(range: vec4i) -> vec4u {
+    let first = vec2u(range.xy) / TILE;
+    return vec4u(first, min(vec2u(range.zw) / TILE, first + u32(TILES_A_SIDE) - 1u));
 }
 
 fn slot_of(id: vec3u) -> u32 {
@@ -102,7 +119,7 @@ fn project_photons(@builtin(global_invocation_id) id: vec3u) {
     if index >= params.slot_count {
         return;
     }
-    rectangles[index] = 0u;
+    rectangles[index] = vec2u(NO_PIXELS);
     let photon = photons[params.first_slot + index];
     if (photon.state & (PHOTON_STATE_MASK | PHOTON_FIRST_HIT)) != PHOTON_STORED {
         return;
@@ -111,22 +128,21 @@ fn project_photons(@builtin(global_invocation_id) id: vec3u) {
     if !(h > 0.0) {
         return;
     }
-    var range = tile_range(photon.position, h);
-    for (var i = 0u; i < 8u && any(range.zw - range.xy >= vec2i(TILES_A_SIDE)); i++) {
+    var range = pixel_range(photon.position, h);
+    for (var i = 0u; i < 8u && any((range.zw >> vec2u(4u)) - (range.xy >> vec2u(4u)) >= vec2i(TILES_A_SIDE)); i++) {
         h *= 0.75;
-        range = tile_range(photon.position, h);
+        range = pixel_range(photon.position, h);
     }
-    range = vec4i(range.xy, min(range.zw, range.xy + TILES_A_SIDE - 1));
-    if any(range.zw < range.xy) {
+    if is_empty(range) {
         return;
     }
+    let tile_range = tiles_of(range);
     splats[index] = Splat(photon.position, h, photon.flux, photon.normal);
-    let extent = vec2u(range.zw - range.xy + 1);
-    rectangles[index] = u32(range.x) | (u32(range.y) << 12u) | (extent.x << 24u) | (extent.y << 28u);
+    rectangles[index] = vec2u(pack_pixel(range.xy), pack_pixel(range.zw));
     let peak = max(photon.flux.x, max(photon.flux.y, photon.flux.z)) * splat_kernel(0.0) / (h * h);
-    for (var y = range.y; y <= range.w; y++) {
-        for (var x = range.x; x <= range.z; x++) {
-            let tile = u32(y) * params.tile_columns + u32(x);
+    for (var y = tile_range.y; y <= tile_range.w; y++) {
+        for (var x = tile_range.x; x <= tile_range.z; x++) {
+            let tile = y * params.tile_columns + x;
             atomicAdd(&tiles[tile].count, 1u);
             atomicMax(&tiles[tile].brightest, bitcast<u32>(peak));
         }
@@ -172,12 +188,13 @@ fn bin_splats(@builtin(global_invocation_id) id: vec3u) {
     if index >= params.slot_count {
         return;
     }
-    let rectangle = rectangles[index];
-    let corner = vec2u(rectangle & 4095u, (rectangle >> 12u) & 4095u);
-    let extent = vec2u((rectangle >> 24u) & 15u, rectangle >> 28u);
-    for (var y = 0u; y < extent.y; y++) {
-        for (var x = 0u; x < extent.x; x++) {
-            let tile = (corner.y + y) * params.tile_columns + corner.x + x;
+    if rectangles[index].x == NO_PIXELS {
+        return;
+    }
+    let range = tiles_of(unpack_pixels(rectangles[index]));
+    for (var y = range.y; y <= range.w; y++) {
+        for (var x = range.x; x <= range.z; x++) {
+            let tile = y * params.tile_columns + x;
             let at = tiles[tile].first + atomicAdd(&tiles[tile].filled, 1u);
             if at < params.capacity {
                 list[at] = index;
@@ -201,16 +218,30 @@ fn power_of_two(e: i32) -> f32 {
     return bitcast<f32>(u32(clamp(e, -126, 127) + 127) << 23u);
 }
 
+// A batch of the tile's splats, and for each block of 4 x 4 pixels one bit for each splat that may touch it: a splat
+// misses most pixels of a tile, and a block need not look at those that miss it.
 var<workgroup> batch: array<Splat, 256>;
+var<workgroup> block_masks: array<atomic<u32>, 128>;
 // First, count and brightest of the workgroup's tile
 var<workgroup> tile_list: vec3u;
 
-@compute @workgroup_size(16, 16)
-fn gather_tiles(
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(global_invocation_id) id: vec3u,
-    @builtin(local_invocation_index) lane: u32,
-) {
+const BLOCK: i32 = 4;
+const WORDS_A_BLOCK: u32 = 8u;
+
+// Sets a splat's bit in every block of the tile that its pixels touch.
+fn mark_blocks(tile_corner: vec2i, range: vec4i, lane: u32) {
+    let first = max(range.xy - tile_corner, vec2i(0)) / BLOCK;
+    let last = min((range.zw - tile_corner) / BLOCK, vec2i(3));
+    for (var y = first.y; y <= last.y; y++) {
+        for (var x = first.x; x <= last.x; x++) {
+            let word = u32(4 * y + x) * WORDS_A_BLOCK + lane / 32u;
+            atomicOr(&block_masks[word], 1u << (lane % 32u));
+        }
+    }
+}
+
+@compute @workgroup_size(256)
+fn gather_tiles(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let tile = group.y * params.tile_columns + group.x;
     if lane == 0u {
         tile_list = vec3u(tiles[tile].first, atomicLoad(&tiles[tile].count), atomicLoad(&tiles[tile].brightest));
@@ -220,8 +251,12 @@ fn gather_tiles(
     let exponent = i32(listed.z >> 23u) - 127;
     let to_quanta = power_of_two(30 - exponent);
 
-    let inside = all(id.xy < view.size);
-    let pixel = min(id.xy, view.size - 1u);
+    // Sixteen neighbouring lanes share a block.
+    let block = lane / 16u;
+    let tile_corner = group.xy * TILE;
+    let id = tile_corner + 4u * vec2u(block % 4u, block / 4u) + vec2u(lane % 4u, (lane / 4u) % 4u);
+    let inside = all(id < view.size);
+    let pixel = min(id, view.size - 1u);
     let at = pixel + view.origin;
     let seen = inside && textureLoad(base_color_texture, at, 0).a > 0.0;
     let p = splat_position(view, vec2i(pixel));
@@ -232,15 +267,25 @@ fn gather_tiles(
     var green = vec2u(0u);
     var blue = vec2u(0u);
     for (var start = 0u; start < listed.y; start += 256u) {
-        let batch_length = min(256u, listed.y - start);
-        if lane < batch_length {
-            batch[lane] = splats[list[listed.x + start + lane]];
+        if lane < 128u {
+            atomicStore(&block_masks[lane], 0u);
         }
         workgroupBarrier();
-        if seen {
-            for (var i = 0u; i < batch_length; i++) {
+        if start + lane < listed.y {
+            let index = list[listed.x + start + lane];
+            batch[lane] = splats[index];
+            mark_blocks(vec2i(tile_corner), unpack_pixels(rectangles[index]), lane);
+        }
+        workgroupBarrier();
+        for (var word = 0u; word < WORDS_A_BLOCK; word++) {
+            var mask = atomicLoad(&block_masks[block * WORDS_A_BLOCK + word]);
+            if !seen {
+                mask = 0u;
+            }
+            while mask != 0u {
+                let i = 32u * word + countTrailingZeros(mask);
+                mask &= mask - 1u;
                 let d = p - batch[i].position;
-                // The cheap test first: most splats of a tile miss a given pixel.
                 if dot(d, d) < batch[i].radius * batch[i].radius {
                     let splat = batch[i];
                     let weight = splat_weight(p, n, splat.position, octahedral_unpack(splat.normal), splat.radius);
@@ -255,6 +300,6 @@ fn gather_tiles(
     }
     if inside {
         let sum = vec3f(f32_from_64(red), f32_from_64(green), f32_from_64(blue));
-        textureStore(irradiance, id.xy, vec4f(sum * power_of_two(exponent - 30), select(0.0, 1.0, seen)));
+        textureStore(irradiance, id, vec4f(sum * power_of_two(exponent - 30), select(0.0, 1.0, seen)));
     }
 }

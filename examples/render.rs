@@ -1,0 +1,427 @@
+//! Renders a glTF file or a built-in sample with global illumination: the one command line for every figure.
+//!
+//! ```text
+//! cargo run --release --example render -- scene.glb --preset balanced --out image.exr --stats image.json
+//! cargo run --release --example render -- sample:cornell --component indirect --out indirect.png
+//! ```
+//!
+//! Bad input gets one line on stderr, exit status 2, and no partial output file.
+
+mod common;
+
+use clap::{Parser, ValueEnum};
+use common::adapter::{Gpu, Wishes};
+use common::offline::{Component, Offline};
+use common::{exr_file, gltf_scene, picture};
+use lightfall::frame::{GiRenderer, Plan, Settings};
+use lightfall::scene::{Scene, SceneSummary, UnitFrame, samples};
+use lightfall::Timestamps;
+use serde_json::{Value, json};
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Frames timed when there is nothing to accumulate.
+const TIMED_FRAMES: u32 = 3;
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Part {
+    All,
+    /// Emission and direct light.
+    Direct,
+    /// All but direct.
+    Indirect,
+    /// Not available yet.
+    Caustic,
+    /// Not available yet.
+    Specular,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Tracer {
+    ImageSpace,
+    /// Not available yet.
+    Bvh,
+    /// Not available yet.
+    Hybrid,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Method {
+    Splatting,
+    /// Not available yet.
+    SurfaceLights,
+    /// Not available yet.
+    IlluminationMaps,
+}
+
+/// Renders a scene with global illumination.
+#[derive(Parser)]
+#[command(after_help = "Not available yet: --preset reference, --component caustic|specular, --tracer bvh|hybrid, \
+    --method surface-lights|illumination-maps, --budget-ms, glTF skins.")]
+struct Arguments {
+    /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, plane, furnace, two-rooms)
+    scene: String,
+    /// Width in pixels
+    #[arg(long, default_value_t = 512)]
+    width: u32,
+    /// Height in pixels
+    #[arg(long, default_value_t = 512)]
+    height: u32,
+    /// Index of the file's camera
+    #[arg(long, default_value_t = 0)]
+    camera: usize,
+    /// fast, balanced, accurate
+    #[arg(long, default_value = "balanced")]
+    preset: String,
+    /// Which part of the light to keep
+    #[arg(long, value_enum, default_value = "all")]
+    component: Part,
+    /// Surfaces that light scatters at before the one the eye sees (default: the preset's)
+    #[arg(long)]
+    bounces: Option<u32>,
+    /// How photons find what they hit
+    #[arg(long, value_enum, default_value = "image-space")]
+    tracer: Tracer,
+    /// How indirect light is represented
+    #[arg(long, value_enum, default_value = "splatting")]
+    method: Method,
+    /// Any field of Settings, repeatable; an unknown key lists them all
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    /// Time in seconds at which animations and samples are shown
+    #[arg(long, default_value_t = 0.0)]
+    time: f64,
+    /// Writes numbered files over a span of time and reports the time per frame
+    #[arg(long, value_name = "FROM:TO:FRAMES")]
+    animate: Option<String>,
+    /// Frames to accumulate, with jittered camera and fresh photons (default: the preset's)
+    #[arg(long)]
+    frames: Option<u32>,
+    /// Not available yet: chooses settings for this much GPU time
+    #[arg(long)]
+    budget_ms: Option<f64>,
+    /// Image to write: .exr (linear radiance) or .png (tone-mapped)
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Exposure of a PNG (default: brings its mean to a middle grey)
+    #[arg(long)]
+    exposure: Option<f32>,
+    /// Machine-readable report to write, JSON
+    #[arg(long)]
+    stats: Option<PathBuf>,
+    /// Part of the adapter's name or backend (default: a discrete GPU, software last)
+    #[arg(long)]
+    adapter: Option<String>,
+    /// Print the plan and stop
+    #[arg(long)]
+    explain: bool,
+}
+
+fn main() {
+    let arguments = Arguments::try_parse().unwrap_or_else(|error| {
+        if error.use_stderr() {
+            let text = error.to_string();
+            fail(text.lines().next().unwrap_or_default().trim_start_matches("error: "));
+        }
+        error.exit()
+    });
+    if let Err(message) = run(&arguments) {
+        fail(&message);
+    }
+}
+
+fn fail(message: &str) -> ! {
+    eprintln!("render: {message}");
+    std::process::exit(2);
+}
+
+fn run(arguments: &Arguments) -> Result<(), String> {
+    let component = check_available(arguments)?;
+    let settings = settings(arguments)?;
+    let times = times(arguments)?;
+    let scene = load(arguments, times[0])?;
+    let summary = SceneSummary::of(&scene).map_err(|e| format!("{}: {e}", arguments.scene))?;
+    if arguments.explain {
+        print!("{}", Plan::for_scene(&summary, &settings));
+        return Ok(());
+    }
+    check_scene(arguments, &scene, &summary)?;
+    let wishes = Wishes {
+        timestamps: true,
+        features: GiRenderer::required_features(&settings),
+        large_buffers: true,
+    };
+    let gpu = Gpu::open(arguments.adapter.as_deref(), wishes)?;
+    let setup = Instant::now();
+    let size = [arguments.width, arguments.height];
+    let mut offline =
+        Offline::new(&gpu, scene, &settings, arguments.camera, size, component).map_err(|e| e.to_string())?;
+    let setup_ms = setup.elapsed().as_secs_f64() * 1e3;
+    let timestamps = Timestamps::new(&gpu.device).ok();
+    let mut clock = Clock::new(setup_ms, timestamps.is_some());
+    let bar = progress(times.len() as u64 * u64::from(settings.frames));
+    for (number, &time) in times.iter().enumerate() {
+        if number > 0 {
+            offline.set_scene(load(arguments, time)?).map_err(|e| e.to_string())?;
+        }
+        for _ in 0..settings.frames {
+            clock.frame(&gpu, &mut offline, timestamps.as_ref())?;
+            bar.inc(1);
+        }
+        if let Some(out) = &arguments.out {
+            let path = if arguments.animate.is_some() { numbered(out, number) } else { out.clone() };
+            write(&gpu, &offline, &path, arguments.exposure)?;
+        }
+    }
+    bar.finish_and_clear();
+    if arguments.stats.is_some() {
+        while clock.frames_ms.len() < TIMED_FRAMES as usize {
+            clock.frame(&gpu, &mut offline, timestamps.as_ref())?;
+        }
+    }
+    if let Some(error) = gpu.take_errors().first() {
+        return Err(format!("the device reported: {}", error.lines().next().unwrap_or_default()));
+    }
+    if let Some(path) = &arguments.stats {
+        let report = report(&gpu, &offline, &summary, &settings, &clock)?;
+        let text = serde_json::to_string_pretty(&report).map_err(|e| e.to_string())?;
+        exr_file::replace_file(path, text.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// Refuses what a later version will do, by name; returns the component.
+fn check_available(arguments: &Arguments) -> Result<Component, String> {
+    let not_yet = |what: &str| Err(format!("{what}: not available yet"));
+    if arguments.budget_ms.is_some() {
+        return not_yet("--budget-ms");
+    }
+    if arguments.preset == "reference" {
+        return not_yet("--preset reference");
+    }
+    if arguments.tracer != Tracer::ImageSpace {
+        return not_yet("--tracer bvh and hybrid");
+    }
+    if arguments.method != Method::Splatting {
+        return not_yet("--method surface-lights and illumination-maps");
+    }
+    match arguments.component {
+        Part::All => Ok(Component::All),
+        Part::Direct => Ok(Component::Direct),
+        Part::Indirect => Ok(Component::Indirect),
+        Part::Caustic | Part::Specular => not_yet("--component caustic and specular"),
+    }
+}
+
+fn settings(arguments: &Arguments) -> Result<Settings, String> {
+    let mut settings = Settings::preset(&arguments.preset)
+        .ok_or_else(|| format!("--preset {:?}: expected fast, balanced or accurate", arguments.preset))?;
+    let mut set = |key: &str, value: &str| settings.set(key, value).map_err(|e| e.to_string());
+    for pair in &arguments.set {
+        let (key, value) = pair
+            .split_once('=')
+            .ok_or_else(|| format!("--set {pair:?}: expected KEY=VALUE"))?;
+        set(key.trim(), value.trim())?;
+    }
+    if let Some(bounces) = arguments.bounces {
+        set("bounces", &bounces.to_string())?;
+    }
+    if let Some(frames) = arguments.frames {
+        set("frames", &frames.to_string())?;
+    }
+    Ok(settings)
+}
+
+/// The times to show: one, or a span.
+fn times(arguments: &Arguments) -> Result<Vec<f64>, String> {
+    let Some(span) = &arguments.animate else {
+        return Ok(vec![arguments.time]);
+    };
+    let bad = || format!("--animate {span:?}: expected FROM:TO:FRAMES, as in 0:2:48");
+    let parts: Vec<&str> = span.split(':').collect();
+    let [from, to, count] = parts[..] else {
+        return Err(bad());
+    };
+    let (from, to): (f64, f64) = (from.parse().map_err(|_| bad())?, to.parse().map_err(|_| bad())?);
+    let count: u32 = count.parse().map_err(|_| bad())?;
+    if count == 0 || !from.is_finite() || !to.is_finite() {
+        return Err(bad());
+    }
+    let step = (to - from) / f64::from(count);
+    Ok((0..count).map(|i| from + step * f64::from(i)).collect())
+}
+
+fn load(arguments: &Arguments, time: f64) -> Result<Scene, String> {
+    if !time.is_finite() {
+        return Err("--time: expected a finite number of seconds".into());
+    }
+    match arguments.scene.strip_prefix("sample:") {
+        Some(name) => samples::by_name(name, time)
+            .ok_or_else(|| format!("no sample is called {name:?}; there are {}", samples::NAMES.join(", "))),
+        None => gltf_scene::load(Path::new(&arguments.scene), time),
+    }
+}
+
+fn check_scene(arguments: &Arguments, scene: &Scene, summary: &SceneSummary) -> Result<(), String> {
+    let name = &arguments.scene;
+    match scene.cameras.len() {
+        0 => return Err(format!("{name}: has no camera")),
+        n if arguments.camera >= n => return Err(format!("{name}: has {n} camera(s), --camera counts from 0")),
+        _ => {}
+    }
+    if summary.lights == 0 && summary.emissive.is_empty() {
+        return Err(format!("{name}: has no light"));
+    }
+    if arguments.width == 0 || arguments.height == 0 {
+        return Err("--width and --height: expected at least 1".into());
+    }
+    match &arguments.out {
+        Some(path) if !["exr", "png"].contains(&extension(path).as_str()) => {
+            Err(format!("{}: expected a name ending in .exr or .png", path.display()))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn extension(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
+}
+
+/// "image.png" with a number before its extension.
+fn numbered(path: &Path, number: usize) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    path.with_file_name(format!("{stem}.{number:04}.{}", extension(path)))
+}
+
+fn write(gpu: &Gpu, offline: &Offline<'_>, path: &Path, exposure: Option<f32>) -> Result<(), String> {
+    let pixels = offline.read().map_err(|e| e.to_string())?;
+    let size = offline.view.g_buffer().size();
+    if extension(path) == "exr" {
+        return exr_file::write_rgb(path, size[0], size[1], &pixels);
+    }
+    let exposure = exposure.unwrap_or_else(|| picture::exposure_for(&pixels));
+    picture::write_png(gpu, path, offline.radiance(), exposure)
+}
+
+/// A bar on a terminal, nothing in a pipe.
+fn progress(length: u64) -> indicatif::ProgressBar {
+    if std::io::stderr().is_terminal() && length > 1 {
+        indicatif::ProgressBar::new(length)
+    } else {
+        indicatif::ProgressBar::hidden()
+    }
+}
+
+/// Times of frames and stages.
+struct Clock {
+    setup_ms: f64,
+    on_gpu: bool,
+    /// Steady-state frames only: the first one also compiles and allocates.
+    frames_ms: Vec<f64>,
+    stages: Vec<(&'static str, Vec<f64>)>,
+    seen_first: bool,
+}
+
+impl Clock {
+    fn new(setup_ms: f64, on_gpu: bool) -> Self {
+        Self {
+            setup_ms,
+            on_gpu,
+            frames_ms: Vec::new(),
+            stages: Vec::new(),
+            seen_first: false,
+        }
+    }
+
+    fn frame(&mut self, gpu: &Gpu, offline: &mut Offline<'_>, timestamps: Option<&Timestamps>) -> Result<(), String> {
+        let start = Instant::now();
+        offline.render_frame(timestamps).map_err(|e| e.to_string())?;
+        let wall_ms = start.elapsed().as_secs_f64() * 1e3;
+        let stages = match timestamps {
+            Some(t) => t.take_blocking(&gpu.device, &gpu.queue).map_err(|e| e.to_string())?,
+            None => Vec::new(),
+        };
+        if !self.seen_first {
+            self.seen_first = true;
+            return Ok(());
+        }
+        self.frames_ms
+            .push(if self.on_gpu { stages.iter().map(|s| s.1).sum() } else { wall_ms });
+        for (label, ms) in stages {
+            match self.stages.iter_mut().find(|(l, _)| *l == label) {
+                Some((_, all)) => all.push(ms),
+                None => self.stages.push((label, vec![ms])),
+            }
+        }
+        Ok(())
+    }
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
+fn report(
+    gpu: &Gpu,
+    offline: &Offline<'_>,
+    summary: &SceneSummary,
+    settings: &Settings,
+    clock: &Clock,
+) -> Result<Value, String> {
+    let frame = UnitFrame::new(&summary.bounds, summary.total_flux).map_err(|e| e.to_string())?;
+    let watts = |flux: [f32; 3]| flux.map(|v| f64::from(v) * frame.flux_scale());
+    let hops = offline.statistics().map_err(|e| e.to_string())?;
+    let energy: Vec<Value> = (0..)
+        .zip(&hops)
+        .map(|(bounce, hop): (u32, _)| {
+            json!({
+                "bounce": bounce, "in": watts(hop.emitted), "absorbed": watts(hop.absorbed),
+                "stored": watts(hop.stored), "escaped": watts(hop.escaped), "lost": watts(hop.lost),
+            })
+        })
+        .collect();
+    let by_resource = offline.memory_by_resource();
+    let plan = offline.renderer.plan().map(|p| p.stages.clone()).unwrap_or_default();
+    let spread = |f: fn(f64, f64) -> f64| clock.frames_ms.iter().copied().reduce(f);
+    let stages: Vec<Value> = clock
+        .stages
+        .iter()
+        .map(|(name, all)| json!({"name": name.trim_start_matches("lightfall::"), "ms": median(all)}))
+        .collect();
+    Ok(json!({
+        "adapter": {
+            "name": gpu.info.name, "backend": gpu.info.backend.to_string(),
+            "kind": format!("{:?}", gpu.info.device_type), "driver": gpu.info.driver_info,
+        },
+        "size": offline.view.g_buffer().size(),
+        "frames": settings.frames,
+        "settings": settings.entries().into_iter().collect::<std::collections::BTreeMap<_, _>>(),
+        "time": {
+            "clock": if clock.on_gpu { "gpu" } else { "wall" },
+            "setup_ms": clock.setup_ms,
+            "frame_ms": {"median": median(&clock.frames_ms), "min": spread(f64::min), "max": spread(f64::max)},
+            "stages": stages,
+        },
+        "photons": {
+            "emitted": offline.renderer.photons().map_or(0, |p| p.count()),
+            "stored": hops.iter().map(|h| h.stored_count).sum::<u64>(),
+            "caustic": 0,
+        },
+        "energy": energy,
+        "env_maps": {
+            "candidates": settings.selector.candidates,
+            "used": offline.renderer.env_maps().map_or(0, |m| m.centers().len()),
+            "coverage": null,
+        },
+        "bytes": {
+            "total": by_resource.iter().map(|r| r.1).sum::<u64>(),
+            "by_resource": by_resource.into_iter().collect::<std::collections::BTreeMap<_, _>>(),
+        },
+        "plan": plan.iter().map(|s| json!({"stage": s.stage.name(), "on": s.on, "reason": s.reason})).collect::<Vec<_>>(),
+        "simplifications": offline.renderer.plan().map(|p| p.simplifications.clone()).unwrap_or_default(),
+        "error_estimate": null,
+    }))
+}
