@@ -13,9 +13,9 @@ use clap::{Parser, ValueEnum};
 use common::adapter::{Gpu, Wishes};
 use common::offline::{Component, Offline};
 use common::{exr_file, gltf_scene, picture};
+use lightfall::Timestamps;
 use lightfall::frame::{GiRenderer, Plan, Settings};
 use lightfall::scene::{Scene, SceneSummary, UnitFrame, samples};
-use lightfall::Timestamps;
 use serde_json::{Value, json};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -57,8 +57,10 @@ enum Method {
 
 /// Renders a scene with global illumination.
 #[derive(Parser)]
-#[command(after_help = "Not available yet: --preset reference, --component caustic|specular, --tracer bvh|hybrid, \
-    --method surface-lights|illumination-maps, --budget-ms, glTF skins.")]
+#[command(
+    after_help = "Not available yet: --preset reference, --component caustic|specular, --tracer bvh|hybrid, \
+    --method surface-lights|illumination-maps, --budget-ms, glTF skins."
+)]
 struct Arguments {
     /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, plane, furnace, two-rooms)
     scene: String,
@@ -170,7 +172,11 @@ fn run(arguments: &Arguments) -> Result<(), String> {
             bar.inc(1);
         }
         if let Some(out) = &arguments.out {
-            let path = if arguments.animate.is_some() { numbered(out, number) } else { out.clone() };
+            let path = if arguments.animate.is_some() {
+                numbered(out, number)
+            } else {
+                out.clone()
+            };
             write(&gpu, &offline, &path, arguments.exposure)?;
         }
     }
@@ -181,7 +187,10 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         }
     }
     if let Some(error) = gpu.take_errors().first() {
-        return Err(format!("the device reported: {}", error.lines().next().unwrap_or_default()));
+        return Err(format!(
+            "the device reported: {}",
+            error.lines().next().unwrap_or_default()
+        ));
     }
     if let Some(path) = &arguments.stats {
         let report = report(&gpu, &offline, &summary, &settings, &clock)?;
@@ -346,8 +355,11 @@ impl Clock {
             self.seen_first = true;
             return Ok(());
         }
-        self.frames_ms
-            .push(if self.on_gpu { stages.iter().map(|s| s.1).sum() } else { wall_ms });
+        self.frames_ms.push(if self.on_gpu {
+            stages.iter().map(|s| s.1).sum()
+        } else {
+            wall_ms
+        });
         for (label, ms) in stages {
             match self.stages.iter_mut().find(|(l, _)| *l == label) {
                 Some((_, all)) => all.push(ms),

@@ -440,19 +440,18 @@ pub(crate) fn render_pass<'a>(
         }),
         stencil_ops: None,
     });
-    encoder
-        .begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some(label),
-            color_attachments: &attachments,
-            depth_stencil_attachment: depth,
-            timestamp_writes: span.map(|s| wgpu::RenderPassTimestampWrites {
-                query_set: s.query_set,
-                beginning_of_pass_write_index: Some(s.begin),
-                end_of_pass_write_index: Some(s.end),
-            }),
-            occlusion_query_set: None,
-            multiview_mask: None,
-        })
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some(label),
+        color_attachments: &attachments,
+        depth_stencil_attachment: depth,
+        timestamp_writes: span.map(|s| wgpu::RenderPassTimestampWrites {
+            query_set: s.query_set,
+            beginning_of_pass_write_index: Some(s.begin),
+            end_of_pass_write_index: Some(s.end),
+        }),
+        occlusion_query_set: None,
+        multiview_mask: None,
+    })
 }
 
 /// Workgroups of a two-dimensional dispatch for `count` one-dimensional workgroups, none above 65 535 an axis.

@@ -50,8 +50,18 @@ impl Timestamps {
                 ty: wgpu::QueryType::Timestamp,
                 count: CAPACITY,
             }),
-            resolved: gpu::buffer(device, "lightfall::Timestamps::resolved", bytes, U::QUERY_RESOLVE | U::COPY_SRC)?,
-            read_back: gpu::buffer(device, "lightfall::Timestamps::read_back", bytes, U::MAP_READ | U::COPY_DST)?,
+            resolved: gpu::buffer(
+                device,
+                "lightfall::Timestamps::resolved",
+                bytes,
+                U::QUERY_RESOLVE | U::COPY_SRC,
+            )?,
+            read_back: gpu::buffer(
+                device,
+                "lightfall::Timestamps::read_back",
+                bytes,
+                U::MAP_READ | U::COPY_DST,
+            )?,
             labels: RefCell::new(Vec::new()),
         })
     }

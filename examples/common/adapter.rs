@@ -69,7 +69,11 @@ impl Gpu {
 /// loader is talkative.
 pub(crate) fn list() -> Vec<(wgpu::Adapter, bool)> {
     let primary = adapters(wgpu::Backends::PRIMARY);
-    if primary.is_empty() { adapters(wgpu::Backends::SECONDARY) } else { primary }
+    if primary.is_empty() {
+        adapters(wgpu::Backends::SECONDARY)
+    } else {
+        primary
+    }
 }
 
 fn adapters(backends: wgpu::Backends) -> Vec<(wgpu::Adapter, bool)> {
@@ -89,9 +93,9 @@ fn adapters(backends: wgpu::Backends) -> Vec<(wgpu::Adapter, bool)> {
 fn choose(name: Option<&str>) -> Result<wgpu::Adapter, String> {
     let wanted = name.map(str::to_lowercase);
     let matches = |info: &wgpu::AdapterInfo| {
-        wanted.as_ref().is_none_or(|w| {
-            info.name.to_lowercase().contains(w) || info.backend.to_string().to_lowercase().contains(w)
-        })
+        wanted
+            .as_ref()
+            .is_none_or(|w| info.name.to_lowercase().contains(w) || info.backend.to_string().to_lowercase().contains(w))
     };
     let (mut usable, mut seen) = (Vec::new(), Vec::new());
     for (adapter, is_usable) in list() {
@@ -110,7 +114,11 @@ fn choose(name: Option<&str>) -> Result<wgpu::Adapter, String> {
     });
     usable.into_iter().next().ok_or_else(|| {
         let which = wanted.map_or(String::new(), |w| format!(" matching {w:?}"));
-        let found = if seen.is_empty() { "none".to_owned() } else { seen.join(", ") };
+        let found = if seen.is_empty() {
+            "none".to_owned()
+        } else {
+            seen.join(", ")
+        };
         format!("no adapter{which} that runs core WebGPU (found: {found}); run examples/setup-adapter.sh")
     })
 }

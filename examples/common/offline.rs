@@ -81,10 +81,18 @@ impl<'a> Offline<'a> {
             .renderer
             .set_scene(queue, &SceneSummary::of(&self.scene)?, &self.scene.lights)?;
         let jitter = match self.accumulator {
-            Some(_) => [radical_inverse(self.frames + 1, 2) - 0.5, radical_inverse(self.frames + 1, 3) - 0.5],
+            Some(_) => [
+                radical_inverse(self.frames + 1, 2) - 0.5,
+                radical_inverse(self.frames + 1, 3) - 0.5,
+            ],
             None => [0.0; 2],
         };
-        let mut cameras = [CameraView::new(&frame, &self.scene.cameras[self.camera], self.size, jitter)];
+        let mut cameras = [CameraView::new(
+            &frame,
+            &self.scene.cameras[self.camera],
+            self.size,
+            jitter,
+        )];
         self.renderer.prepare(queue, &mut self.geometry, &mut cameras)?;
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let geometry: &dyn Geometry = &self.geometry;

@@ -12,7 +12,12 @@ const MEAN_AFTER_EXPOSURE: f32 = 0.3;
 
 /// Exposure that brings the mean of an image to a middle grey; 1 for a black one.
 pub(crate) fn exposure_for(pixels: &[[f32; 3]]) -> f32 {
-    let sum: f64 = pixels.iter().flatten().filter(|v| v.is_finite()).map(|&v| f64::from(v)).sum();
+    let sum: f64 = pixels
+        .iter()
+        .flatten()
+        .filter(|v| v.is_finite())
+        .map(|&v| f64::from(v))
+        .sum();
     let mean = (sum / (3 * pixels.len().max(1)) as f64) as f32;
     if mean > 0.0 { MEAN_AFTER_EXPOSURE / mean } else { 1.0 }
 }
@@ -37,7 +42,9 @@ pub(crate) fn write_png(gpu: &Gpu, path: &Path, radiance: &Radiance, exposure: f
         exposure,
         ..Default::default()
     };
-    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let mut encoder = gpu
+        .device
+        .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     let inputs = ToneMapInputs {
         queue: &gpu.queue,
         radiance,

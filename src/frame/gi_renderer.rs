@@ -209,7 +209,11 @@ impl GiRenderer {
         let (device, settings) = (&self.device, &self.settings);
         if !plan.is_on(Stage::DirectLight) {
             self.direct = None;
-        } else if self.direct.as_ref().is_none_or(|d| d.shadow_layers != ShadowMaps::layers(lights)) {
+        } else if self
+            .direct
+            .as_ref()
+            .is_none_or(|d| d.shadow_layers != ShadowMaps::layers(lights))
+        {
             self.direct = Some(DirectScene {
                 lights: Lights::new(device)?,
                 shadow_maps: ShadowMaps::new(device, lights, settings.shadow_map_size)?,
@@ -236,11 +240,7 @@ impl GiRenderer {
     ///
     /// # Errors
     /// [`Error::ReadBack`], [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
-    pub fn place_env_maps_blocking(
-        &mut self,
-        queue: &wgpu::Queue,
-        geometry: &mut dyn Geometry,
-    ) -> Result<(), Error> {
+    pub fn place_env_maps_blocking(&mut self, queue: &wgpu::Queue, geometry: &mut dyn Geometry) -> Result<(), Error> {
         let (Some(state), Some(indirect)) = (&self.state, &mut self.indirect) else {
             return Ok(());
         };
@@ -506,10 +506,16 @@ impl GiRenderer {
         let mut list = vec![("black", self.black.memory_use())];
         if let Some(direct) = &self.direct {
             list.push(("lights", direct.lights.memory_use()));
-            list.push(("shadow_maps", direct.shadow_maps.memory_use() + direct.capture.memory_use()));
+            list.push((
+                "shadow_maps",
+                direct.shadow_maps.memory_use() + direct.capture.memory_use(),
+            ));
         }
         if let Some(indirect) = &self.indirect {
-            list.push(("env_maps", indirect.env_maps.memory_use() + indirect.capture.memory_use()));
+            list.push((
+                "env_maps",
+                indirect.env_maps.memory_use() + indirect.capture.memory_use(),
+            ));
             list.push(("photons", indirect.photons.memory_use()));
             list.push(("uniforms", indirect.emitter.memory_use() + indirect.tracer.memory_use()));
         }

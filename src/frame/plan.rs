@@ -130,7 +130,10 @@ fn simplifications(summary: &SceneSummary) -> Vec<String> {
     let list = |names: &[String]| names.join(", ");
     let mut notes = Vec::new();
     if !summary.emissive.is_empty() {
-        notes.push(format!("shine for the eye alone, light nothing: {}", list(&summary.emissive)));
+        notes.push(format!(
+            "shine for the eye alone, light nothing: {}",
+            list(&summary.emissive)
+        ));
     }
     if !summary.metals.is_empty() {
         notes.push(format!("metal, treated as Lambertian: {}", list(&summary.metals)));
@@ -194,8 +197,20 @@ mod tests {
             ..summary()
         };
         assert!(!on(&black, &settings));
-        assert!(!on(&summary(), &Settings { bounces: 0, ..settings.clone() }));
-        assert!(!on(&summary(), &Settings { photons: 0, ..settings.clone() }));
+        assert!(!on(
+            &summary(),
+            &Settings {
+                bounces: 0,
+                ..settings.clone()
+            }
+        ));
+        assert!(!on(
+            &summary(),
+            &Settings {
+                photons: 0,
+                ..settings.clone()
+            }
+        ));
     }
 
     #[test]

@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::pass::{
-    Bandwidth, EnvMapSelectorSettings, ImageSpaceTracerSettings, Kernel, PhotonSplatterConfig,
-    PhotonSplatterSettings, SplatShape, TraceMethod,
+    Bandwidth, EnvMapSelectorSettings, ImageSpaceTracerSettings, Kernel, PhotonSplatterConfig, PhotonSplatterSettings,
+    SplatShape, TraceMethod,
 };
 
 /// Most scatterings of a path.
@@ -89,7 +89,7 @@ impl Settings {
             splatter: PhotonSplatterSettings {
                 bandwidth: Bandwidth::Density {
                     photons: 20.0,
-                    clamp: [0.25, 8.0],
+                    clamp: [0.25, 1.0],
                 },
                 ..Default::default()
             },
@@ -214,12 +214,19 @@ const KNOBS: &[Knob] = &[
     field!("frames", "1 or more", frames, |v| v >= 1),
     field!("photons", "0 to 100000000", photons, |v| v <= 100_000_000),
     field!("bounces", "0 to 64", bounces, |v| v <= MAX_BOUNCES),
-    field!("env_maps.count", "1 to 42", env_map_count, |v| (1..=MAX_ENV_MAPS).contains(&v)),
+    field!("env_maps.count", "1 to 42", env_map_count, |v| (1..=MAX_ENV_MAPS)
+        .contains(&v)),
     field!("env_maps.size", "4 to 8192", env_map_size, |v| (4..=8192).contains(&v)),
-    field!("shadow_maps.size", "4 to 8192", shadow_map_size, |v| (4..=8192).contains(&v)),
-    field!("selector.candidates", "1 to 42", selector.candidates, |v| (1..=MAX_ENV_MAPS).contains(&v)),
-    field!("selector.back_face_limit", "0 to 1", selector.back_face_limit, |v| (0.0..=1.0).contains(&v)),
-    field!("selector.clearance", "0 to 1", selector.clearance, |v| (0.0..=1.0).contains(&v)),
+    field!("shadow_maps.size", "4 to 8192", shadow_map_size, |v| (4..=8192)
+        .contains(&v)),
+    field!("selector.candidates", "1 to 42", selector.candidates, |v| (1
+        ..=MAX_ENV_MAPS)
+        .contains(&v)),
+    field!("selector.back_face_limit", "0 to 1", selector.back_face_limit, |v| (0.0
+        ..=1.0)
+        .contains(&v)),
+    field!("selector.clearance", "0 to 1", selector.clearance, |v| (0.0..=1.0)
+        .contains(&v)),
     choice!(
         "tracer.method",
         "paper, plane or ordered-march",
@@ -228,7 +235,8 @@ const KNOBS: &[Knob] = &[
         ["plane", TraceMethod::Plane],
         ["ordered-march", TraceMethod::OrderedMarch]
     ),
-    field!("tracer.iterations", "1 to 32", tracer.iterations, |v| (1..=32).contains(&v)),
+    field!("tracer.iterations", "1 to 32", tracer.iterations, |v| (1..=32)
+        .contains(&v)),
     field!("tracer.roulette_from", "1 or more", tracer.roulette_from, |v| v >= 1),
     choice!(
         "splatter.shape",
@@ -263,7 +271,9 @@ const KNOBS: &[Knob] = &[
             s.density().1[0] = v.parse().ok()?;
             Some(())
         },
-        is_valid: |s| s.is_fixed() || (s.density_values().1[0] > 0.0 && s.density_values().1[0] <= s.density_values().1[1]),
+        is_valid: |s| {
+            s.is_fixed() || (s.density_values().1[0] > 0.0 && s.density_values().1[0] <= s.density_values().1[1])
+        },
     },
     Knob {
         name: "splatter.highest_density",
@@ -273,7 +283,9 @@ const KNOBS: &[Knob] = &[
             s.density().1[1] = v.parse().ok()?;
             Some(())
         },
-        is_valid: |s| s.is_fixed() || (s.density_values().1[1].is_finite() && s.density_values().1[0] <= s.density_values().1[1]),
+        is_valid: |s| {
+            s.is_fixed() || (s.density_values().1[1].is_finite() && s.density_values().1[0] <= s.density_values().1[1])
+        },
     },
     Knob {
         name: "splatter.fixed_radius",
@@ -296,7 +308,8 @@ const KNOBS: &[Knob] = &[
             Bandwidth::Density { .. } => true,
         },
     },
-    field!("splatter.max_radius", "above 0, in pixels", splatter.max_radius, |v| v > 0.0),
+    field!("splatter.max_radius", "above 0, in pixels", splatter.max_radius, |v| v
+        > 0.0),
 ];
 
 #[cfg(test)]
@@ -330,7 +343,10 @@ mod tests {
     fn unknown_names_and_bad_values_say_what_would_do() {
         let mut settings = Settings::balanced();
         let error = settings.set("photon", "1").unwrap_err().to_string();
-        assert!(error.contains("photons") && error.contains("tracer.iterations"), "{error}");
+        assert!(
+            error.contains("photons") && error.contains("tracer.iterations"),
+            "{error}"
+        );
         let error = settings.set("bounces", "65").unwrap_err().to_string();
         assert!(error.contains("0 to 64"), "{error}");
         assert!(settings.set("splatter.kernel", "round").is_err());

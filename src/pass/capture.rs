@@ -1,6 +1,6 @@
 //! What the capture passes share: one render pass for each layer, each with the host's draws.
 
-use crate::resource::{CaptureTargets, CapturePurpose, CaptureView, Geometry};
+use crate::resource::{CapturePurpose, CaptureTargets, CaptureView, Geometry};
 use crate::{Error, Timestamps, gpu};
 
 /// A square depth buffer that captures share, one view after the other.

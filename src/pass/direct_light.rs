@@ -96,7 +96,9 @@ impl DirectLight {
             light_count: inputs.lights.count(),
             shadow_map_size: inputs.shadow_maps.size(),
         };
-        inputs.queue.write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        inputs
+            .queue
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
         let views = inputs.g_buffer.views();
         let bound = [
             (&resources.params).into(),

@@ -156,7 +156,9 @@ impl EnvMapSelector {
         let params = gpu::Params {
             map_size: CANDIDATE_SIZE,
         };
-        inputs.queue.write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        inputs
+            .queue
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
         let bound = [
             (&resources.params).into(),
             resources.env_maps.view().into(),
@@ -266,7 +268,13 @@ mod tests {
 
     #[test]
     fn valid_candidates_come_first_and_in_order() {
-        let sights = [seen(0.9, 1.0), seen(0.0, 1.0), seen(0.3, 1.0), seen(0.1, 1.0), seen(0.0, 0.001)];
+        let sights = [
+            seen(0.9, 1.0),
+            seen(0.0, 1.0),
+            seen(0.3, 1.0),
+            seen(0.1, 1.0),
+            seen(0.0, 0.001),
+        ];
         let settings = EnvMapSelectorSettings::default();
         assert_eq!(EnvMapSelector::choose(&sights, &settings, 1.0, 5), [1, 3, 4, 2, 0]);
         assert_eq!(EnvMapSelector::choose(&sights, &settings, 1.0, 1), [1]);

@@ -31,7 +31,12 @@ impl GBufferCapture {
     }
 
     /// Records the draws into a G-buffer of the crate's own layout.
-    pub fn record(&self, encoder: &mut wgpu::CommandEncoder, g_buffer: &mut GBuffer, inputs: &GBufferCaptureInputs<'_>) {
+    pub fn record(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        g_buffer: &mut GBuffer,
+        inputs: &GBufferCaptureInputs<'_>,
+    ) {
         g_buffer.set_view(inputs.queue, inputs.view);
         let views = g_buffer.views();
         let colors = [&views.normal, &views.base_color, &views.emission];

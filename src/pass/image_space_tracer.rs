@@ -107,7 +107,12 @@ impl ImageSpaceTracer {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
         let slots = [Slot::Uniform, Slot::UintArray, Slot::Storage, Slot::StorageMut];
-        let layout = device::layout(device, "lightfall::ImageSpaceTracer", wgpu::ShaderStages::COMPUTE, &slots);
+        let layout = device::layout(
+            device,
+            "lightfall::ImageSpaceTracer",
+            wgpu::ShaderStages::COMPUTE,
+            &slots,
+        );
         let walk = |method: TraceMethod| {
             device::compute_pipeline(
                 device,
@@ -148,7 +153,9 @@ impl ImageSpaceTracer {
             epsilon: PAPER_EPSILON,
             row,
         };
-        inputs.queue.write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        inputs
+            .queue
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
         let bound = [
             (&resources.params).into(),
             inputs.env_maps.view().into(),

@@ -94,7 +94,9 @@ impl PhotonEmitter {
             shadow_map_size: inputs.shadow_maps.size(),
             row,
         };
-        inputs.queue.write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        inputs
+            .queue
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
         let bound = [
             (&resources.params).into(),
             inputs.lights.buffer().into(),

@@ -153,8 +153,8 @@ impl Default for PhotonSplatterSettings {
     fn default() -> Self {
         Self {
             bandwidth: Bandwidth::Density {
-                photons: 60.0,
-                clamp: [0.25, 8.0],
+                photons: 150.0,
+                clamp: [0.25, 1.0],
             },
             max_radius: LARGEST_RADIUS,
         }
@@ -313,7 +313,9 @@ impl PhotonSplatter {
             bandwidth: bandwidth(inputs),
             _pad: 0,
         };
-        inputs.queue.write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        inputs
+            .queue
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
         let views = inputs.g_buffer.views();
         let bound: [Bound; 11] = [
             (&resources.params).into(),
@@ -362,7 +364,9 @@ impl PhotonSplatter {
             max_radius: inputs.settings.max_radius,
             _pad: [0; 2],
         };
-        inputs.queue.write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        inputs
+            .queue
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
         let views = inputs.g_buffer.views();
         let bound: [Bound; 6] = [
             (&resources.params).into(),

@@ -104,8 +104,13 @@ impl ToneMap {
             .queue
             .write_buffer(&resources.inner.params, 0, bytemuck::bytes_of(&params));
         let bound = [inputs.radiance.view().into()];
-        self.pass
-            .record(encoder, &mut resources.inner, &bound, &[inputs.target], inputs.timestamps);
+        self.pass.record(
+            encoder,
+            &mut resources.inner,
+            &bound,
+            &[inputs.target],
+            inputs.timestamps,
+        );
     }
 }
 

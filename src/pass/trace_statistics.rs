@@ -76,7 +76,12 @@ impl TraceStatistics {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
         let slots = [Slot::Uniform, Slot::Storage, Slot::StorageMut];
-        let layout = device::layout(device, "lightfall::TraceStatistics", wgpu::ShaderStages::COMPUTE, &slots);
+        let layout = device::layout(
+            device,
+            "lightfall::TraceStatistics",
+            wgpu::ShaderStages::COMPUTE,
+            &slots,
+        );
         let sum = device::compute_pipeline(
             device,
             &ComputeSpec {
@@ -104,7 +109,9 @@ impl TraceStatistics {
         let params = gpu::Params {
             photon_count: inputs.photons.count(),
         };
-        inputs.queue.write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        inputs
+            .queue
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
         let bound = [
             (&resources.params).into(),
             inputs.photons.buffer().into(),

@@ -118,7 +118,13 @@ impl GBuffer {
             F::Rg16Float,
             F::Rg32Float,
         ];
-        let color_formats = [F::Rgba16Float, F::Rgba32Float, F::Rgba8Unorm, F::Rgba8UnormSrgb, F::Bgra8UnormSrgb];
+        let color_formats = [
+            F::Rgba16Float,
+            F::Rgba32Float,
+            F::Rgba8Unorm,
+            F::Rgba8UnormSrgb,
+            F::Bgra8UnormSrgb,
+        ];
         let emission_formats = [F::Rgba16Float, F::Rgba32Float, F::Rgba8Unorm, F::Rg11b10Ufloat];
         let usage = wgpu::TextureUsages::TEXTURE_BINDING;
         expect_view("G-buffer depth", &views.depth, &depth_formats, usage)?;
@@ -130,7 +136,8 @@ impl GBuffer {
         expect("G-buffer normal", "size", extent(&views.normal), &[full])?;
         expect("G-buffer base colour", "size", extent(&views.base_color), &[full])?;
         let [x, y, width, height] = views.rectangle.unwrap_or([0, 0, full[0], full[1]]);
-        let fits = |start: u32, length: u32, limit: u32| length > 0 && start.checked_add(length).is_some_and(|e| e <= limit);
+        let fits =
+            |start: u32, length: u32, limit: u32| length > 0 && start.checked_add(length).is_some_and(|e| e <= limit);
         if !fits(x, width, full[0]) || !fits(y, height, full[1]) {
             return Err(Error::IncompatibleView {
                 resource: "G-buffer rectangle",

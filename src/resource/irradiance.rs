@@ -13,8 +13,7 @@ pub struct Irradiance {
 
 impl Irradiance {
     /// Formats that a host may bring.
-    pub const FORMATS: [wgpu::TextureFormat; 2] =
-        [wgpu::TextureFormat::Rgba32Float, wgpu::TextureFormat::Rgba16Float];
+    pub const FORMATS: [wgpu::TextureFormat; 2] = [wgpu::TextureFormat::Rgba32Float, wgpu::TextureFormat::Rgba16Float];
 
     /// Bytes at this size and format.
     pub fn size_in_bytes(size: [u32; 2], format: wgpu::TextureFormat) -> u64 {
@@ -47,7 +46,12 @@ impl Irradiance {
     /// # Errors
     /// [`Error::IncompatibleView`].
     pub fn from_view(view: &wgpu::TextureView) -> Result<Self, Error> {
-        expect_view("Irradiance view", view, &Self::FORMATS, wgpu::TextureUsages::TEXTURE_BINDING)?;
+        expect_view(
+            "Irradiance view",
+            view,
+            &Self::FORMATS,
+            wgpu::TextureUsages::TEXTURE_BINDING,
+        )?;
         Ok(Self {
             view: view.clone(),
             bytes: 0,

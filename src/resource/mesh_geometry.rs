@@ -119,8 +119,8 @@ impl MeshGeometry {
             "lightfall::MeshGeometry::materials",
             scene.materials.len().max(1) * size_of::<gpu::MeshMaterial>(),
         )?;
-        let view_stride = (size_of::<gpu::MeshView>() as u32)
-            .next_multiple_of(device.limits().min_uniform_buffer_offset_alignment);
+        let view_stride =
+            (size_of::<gpu::MeshView>() as u32).next_multiple_of(device.limits().min_uniform_buffer_offset_alignment);
         let view_buffer = view_buffer(device, view_stride, 1)?;
         bytes += view_buffer.size();
         let mut meshes = Vec::with_capacity(scene.meshes.len());
@@ -131,7 +131,11 @@ impl MeshGeometry {
         }
         use device::Slot as S;
         let stages = wgpu::ShaderStages::VERTEX_FRAGMENT;
-        let scene_slots = [S::DynamicUniform(size_of::<gpu::MeshView>() as u64), S::Storage, S::Storage];
+        let scene_slots = [
+            S::DynamicUniform(size_of::<gpu::MeshView>() as u64),
+            S::Storage,
+            S::Storage,
+        ];
         let scene_layout = device::layout(device, "lightfall::MeshGeometry::scene", stages, &scene_slots);
         let material_slots = [S::FilteredTexture, S::FilteredTexture, S::Sampler];
         let material_layout = device::layout(device, "lightfall::MeshGeometry::material", stages, &material_slots);
@@ -163,7 +167,12 @@ impl MeshGeometry {
     pub fn set_transform(&mut self, instance: usize, transform: DAffine3) -> Result<(), Error> {
         let (mesh_count, material_count) = (self.meshes.len(), self.materials.len());
         let Some(current) = self.instances.get_mut(instance) else {
-            return Err(Error::scene("instance", format!("#{instance}"), "index", "is beyond the last instance"));
+            return Err(Error::scene(
+                "instance",
+                format!("#{instance}"),
+                "index",
+                "is beyond the last instance",
+            ));
         };
         let moved = Instance {
             transform,
@@ -366,8 +375,16 @@ fn upload_mesh(device: &wgpu::Device, queue: &wgpu::Queue, mesh: &Mesh) -> Resul
     };
     let vertex_usage = U::VERTEX | U::STORAGE;
     Ok(MeshBuffers {
-        vertices: upload("lightfall::MeshGeometry::vertices", bytemuck::cast_slice(&vertices), vertex_usage)?,
-        indices: upload("lightfall::MeshGeometry::indices", bytemuck::cast_slice(&mesh.indices), U::INDEX)?,
+        vertices: upload(
+            "lightfall::MeshGeometry::vertices",
+            bytemuck::cast_slice(&vertices),
+            vertex_usage,
+        )?,
+        indices: upload(
+            "lightfall::MeshGeometry::indices",
+            bytemuck::cast_slice(&mesh.indices),
+            U::INDEX,
+        )?,
         index_count: mesh.indices.len() as u32,
         sphere: Some(bounding_sphere(&mesh.positions)),
     })

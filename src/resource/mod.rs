@@ -26,7 +26,6 @@ pub use radiance::Radiance;
 pub use shadow_maps::ShadowMaps;
 pub use view::{CameraView, CaptureMask, CapturePurpose, CaptureView};
 
-
 use crate::Error;
 
 /// Checks one property of a host-made view.
@@ -39,7 +38,11 @@ fn expect<T: PartialEq + std::fmt::Debug>(
     if accepted.contains(&found) {
         return Ok(());
     }
-    let expected = accepted.iter().map(|a| format!("{a:?}")).collect::<Vec<_>>().join(" or ");
+    let expected = accepted
+        .iter()
+        .map(|a| format!("{a:?}"))
+        .collect::<Vec<_>>()
+        .join(" or ");
     Err(Error::IncompatibleView {
         resource,
         property,
@@ -49,11 +52,7 @@ fn expect<T: PartialEq + std::fmt::Debug>(
 }
 
 /// Checks that a host-made view has the usages that a pass needs.
-fn expect_usage(
-    resource: &'static str,
-    texture: &wgpu::Texture,
-    needed: wgpu::TextureUsages,
-) -> Result<(), Error> {
+fn expect_usage(resource: &'static str, texture: &wgpu::Texture, needed: wgpu::TextureUsages) -> Result<(), Error> {
     if texture.usage().contains(needed) {
         return Ok(());
     }
@@ -75,6 +74,11 @@ fn expect_view(
     let texture = view.texture();
     expect(resource, "format", texture.format(), formats)?;
     expect(resource, "sample count", texture.sample_count(), &[1])?;
-    expect(resource, "dimension", texture.dimension(), &[wgpu::TextureDimension::D2])?;
+    expect(
+        resource,
+        "dimension",
+        texture.dimension(),
+        &[wgpu::TextureDimension::D2],
+    )?;
     expect_usage(resource, texture, usage)
 }

@@ -102,7 +102,12 @@ impl Photons {
     pub fn new(device: &wgpu::Device, count: u32, bounces: u32) -> Result<Self, Error> {
         let bytes = Self::size_in_bytes(count, bounces).max(PHOTON_BYTES);
         use wgpu::BufferUsages as U;
-        let buffer = gpu::buffer(device, "lightfall::Photons", bytes, U::STORAGE | U::COPY_SRC | U::COPY_DST)?;
+        let buffer = gpu::buffer(
+            device,
+            "lightfall::Photons",
+            bytes,
+            U::STORAGE | U::COPY_SRC | U::COPY_DST,
+        )?;
         Ok(Self {
             buffer,
             count,

@@ -74,7 +74,13 @@ impl CaptureView {
         let scale = 1.0 / tan_half;
         let projection = perspective_matrix(scale, scale);
         let pixels_per_radian = 0.5 * size as f32 * scale;
-        Self::new(purpose, mask, projection * view_matrix(eye, axes), eye.extend(1.0), pixels_per_radian)
+        Self::new(
+            purpose,
+            mask,
+            projection * view_matrix(eye, axes),
+            eye.extend(1.0),
+            pixels_per_radian,
+        )
     }
 
     /// A square parallel view around the frame's origin, `half_extent` to each side.
@@ -89,10 +95,22 @@ impl CaptureView {
         let projection = parallel_matrix(scale, scale, PARALLEL_REACH, -PARALLEL_REACH);
         let view = view_matrix(Vec3::ZERO, axes);
         let pixels_per_radian = 0.5 * size as f32 * scale;
-        Self::new(purpose, mask, projection * view, axes.forward.extend(0.0), pixels_per_radian)
+        Self::new(
+            purpose,
+            mask,
+            projection * view,
+            axes.forward.extend(0.0),
+            pixels_per_radian,
+        )
     }
 
-    fn new(purpose: CapturePurpose, mask: CaptureMask, view_projection: Mat4, eye: Vec4, pixels_per_radian: f32) -> Self {
+    fn new(
+        purpose: CapturePurpose,
+        mask: CaptureMask,
+        view_projection: Mat4,
+        eye: Vec4,
+        pixels_per_radian: f32,
+    ) -> Self {
         Self {
             index: 0,
             purpose,
@@ -277,8 +295,18 @@ mod tests {
 
     #[test]
     fn the_frustum_holds_what_is_in_front_and_leaves_out_what_is_not() {
-        let view = CameraView::new(&frame(), &camera(Projection::Perspective { fov_y: 0.9 }), [64, 64], [0.0; 2]);
-        let inside = |p: Vec3| view.capture.frustum.iter().all(|q| Vec4::from(*q).dot(p.extend(1.0)) >= 0.0);
+        let view = CameraView::new(
+            &frame(),
+            &camera(Projection::Perspective { fov_y: 0.9 }),
+            [64, 64],
+            [0.0; 2],
+        );
+        let inside = |p: Vec3| {
+            view.capture
+                .frustum
+                .iter()
+                .all(|q| Vec4::from(*q).dot(p.extend(1.0)) >= 0.0)
+        };
         assert!(inside(Vec3::ZERO));
         assert!(!inside(Vec3::new(0.0, 0.0, 3.0)), "behind the eye");
         assert!(!inside(Vec3::new(5.0, 0.0, 0.0)), "beside it");
