@@ -103,37 +103,49 @@ fn march_next_map(origin: vec3f, last: vec2f) -> vec2f {
     return next;
 }
 
+// Whether a map vouches for the ray's point at `free`: for its origin by the surface it lies on, further on by distance.
+fn march_knows(map: u32, x: vec3f, normal: vec3f, r: vec3f, free: f32) -> bool {
+    if free > 0.0 {
+        let p = x + free * r;
+        return trace_surface(map, p) >= length(p);
+    }
+    return trace_sees(map, x, normal);
+}
+
+// The ray through the maps in order. Maps that do not know where it stands are passed over, for what they see may lie
+// behind walls; only a ray whose origin no map knows is looked for everywhere.
 fn ordered_march_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
     var free = 0.0;
     var tentative = trace_nothing(TRACE_LOST);
-    var ordered = vec2f(-1.0, -1.0);
-    for (var i = 0u; i < params.map_count; i++) {
-        ordered = march_next_map(origin, ordered);
-        let map = u32(ordered.y);
-        let center = centers[map].xyz;
-        let x = origin - center;
-        var in_front = false;
-        if free > 0.0 {
-            let p = x + free * r;
-            in_front = trace_surface(map, p) >= length(p);
-        } else {
-            in_front = trace_sees(map, x, normal);
-        }
-        var march = march_map(map, x, r, free, in_front);
-        march.hit.position += center;
-        if march.kind == TRACE_HIT {
-            return march.hit;
-        }
-        if march.kind == TRACE_ESCAPED {
-            return trace_nothing(TRACE_ESCAPED);
-        }
-        free = march.free;
-        // A crossing that this map already knows to lie in free space is no surface.
-        if tentative.kind == TRACE_HIT && tentative.distance < free {
-            tentative = trace_nothing(TRACE_LOST);
-        }
-        if march.hit.kind == TRACE_HIT && (tentative.kind != TRACE_HIT || march.hit.distance < tentative.distance) {
-            tentative = march.hit;
+    var is_known = false;
+    for (var round = 0u; round < 2u && !is_known; round++) {
+        var ordered = vec2f(-1.0, -1.0);
+        for (var i = 0u; i < params.map_count; i++) {
+            ordered = march_next_map(origin, ordered);
+            let map = u32(ordered.y);
+            let center = centers[map].xyz;
+            let x = origin - center;
+            let knows = march_knows(map, x, normal, r, free);
+            if !knows && round == 0u {
+                continue;
+            }
+            is_known = is_known || knows;
+            var march = march_map(map, x, r, free, knows);
+            march.hit.position += center;
+            if march.kind == TRACE_HIT {
+                return march.hit;
+            }
+            if march.kind == TRACE_ESCAPED {
+                return trace_nothing(TRACE_ESCAPED);
+            }
+            free = march.free;
+            // A crossing that this map knows to lie in free space is no surface.
+            if tentative.kind == TRACE_HIT && tentative.distance < free {
+                tentative = trace_nothing(TRACE_LOST);
+            }
+            if march.hit.kind == TRACE_HIT && (tentative.kind != TRACE_HIT || march.hit.distance < tentative.distance) {
+                tentative = march.hit;
+            }
         }
     }
     return tentative;

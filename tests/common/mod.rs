@@ -1,0 +1,54 @@
+//! What the tests share: a device, small scenes, statements about images.
+#![allow(dead_code, reason = "each test file uses its own part of this")]
+
+#[path = "../../examples/common/mod.rs"]
+mod examples;
+
+pub(crate) use examples::adapter::{Gpu, Wishes};
+pub(crate) use examples::offline::{self, Component, Offline};
+pub(crate) use examples::{exr_file, gltf_scene, picture};
+
+/// A device, or `None` with a printed reason where the machine has no usable adapter; a failure where
+/// `LIGHTFALL_REQUIRE_GPU=1` says that there must be one.
+pub(crate) fn gpu() -> Option<Gpu> {
+    gpu_with(Wishes::default())
+}
+
+/// As [`gpu`], with more than the defaults.
+pub(crate) fn gpu_with(wishes: Wishes) -> Option<Gpu> {
+    match Gpu::open(None, wishes) {
+        Ok(gpu) => Some(gpu),
+        Err(reason) if std::env::var("LIGHTFALL_REQUIRE_GPU").as_deref() == Ok("1") => panic!("{reason}"),
+        Err(reason) => {
+            println!("skipped: {reason}");
+            None
+        }
+    }
+}
+
+/// Fails on any validation error that the device reported.
+pub(crate) fn assert_no_errors(gpu: &Gpu) {
+    let errors = gpu.take_errors();
+    assert!(errors.is_empty(), "the device reported: {errors:#?}");
+}
+
+/// Mean over pixels of one channel, where `keep(x, y)`.
+pub(crate) fn mean(pixels: &[[f32; 3]], width: u32, channel: usize, keep: impl Fn(u32, u32) -> bool) -> f64 {
+    let kept = (0..).zip(pixels).filter(|(i, _)| keep(i % width, i / width));
+    let (sum, count) = kept.fold((0.0, 0), |(s, n), (_, p)| (s + f64::from(p[channel]), n + 1));
+    sum / f64::from(count)
+}
+
+/// A small generator for test data (splitmix64).
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    /// Uniform in [0, 1).
+    pub(crate) fn unit(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
