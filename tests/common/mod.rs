@@ -1,12 +1,12 @@
 //! What the tests share: a device, small scenes, statements about images.
-#![allow(dead_code, reason = "each test file uses its own part of this")]
+#![allow(dead_code, unused_imports, reason = "each test file uses its own part of this")]
 
 #[path = "../../examples/common/mod.rs"]
 mod examples;
 
 pub(crate) use examples::adapter::{Gpu, Wishes};
 pub(crate) use examples::offline::{self, Component, Offline};
-pub(crate) use examples::{exr_file, gltf_scene, picture};
+pub(crate) use examples::exr_file;
 
 /// A device, or `None` with a printed reason where the machine has no usable adapter; a failure where
 /// `LIGHTFALL_REQUIRE_GPU=1` says that there must be one.

@@ -1,0 +1,444 @@
+//! The renderer as a piece of a host's frame: it equals what a host composes by hand, allocates once, runs on a device
+//! that does nothing, and leaves out what a scene does not need.
+
+mod common;
+
+use common::{Component, Gpu, Offline, assert_no_errors, gpu, offline};
+use lightfall::frame::{GiRenderer, SceneInputs, Settings, Stage, ViewInputs, ViewResources};
+use lightfall::pass::*;
+use lightfall::resource::*;
+use lightfall::scene::{Material, Scene, SceneSummary, samples};
+use lightfall::{creation_count, read_rgba32float_blocking, wgpu};
+
+fn small() -> Settings {
+    Settings {
+        photons: 5_000,
+        env_map_count: 3,
+        env_map_size: 32,
+        shadow_map_size: 64,
+        ..Settings::balanced()
+    }
+}
+
+/// One frame recorded by the renderer, not submitted.
+fn record(
+    renderer: &mut GiRenderer,
+    view: &mut ViewResources,
+    geometry: &mut MeshGeometry,
+    scene: &Scene,
+    (device, queue): (&wgpu::Device, &wgpu::Queue),
+) -> wgpu::CommandEncoder {
+    let summary = SceneSummary::of(scene).unwrap();
+    let frame = renderer.set_scene(queue, &summary, &scene.lights).unwrap();
+    let size = view.g_buffer().size();
+    let mut cameras = [CameraView::new(&frame, &scene.cameras[0], size, [0.0; 2])];
+    renderer.prepare(queue, geometry, &mut cameras).unwrap();
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let scene_inputs = SceneInputs {
+        queue,
+        geometry,
+        sample_offset: 0,
+        timestamps: None,
+    };
+    renderer.record_scene(&mut encoder, &scene_inputs);
+    let composite = CompositeSettings {
+        output_scale: frame.output_scale(1.0).unwrap(),
+        ..Default::default()
+    };
+    let view_inputs = ViewInputs {
+        queue,
+        geometry,
+        view: &cameras[0],
+        composite: &composite,
+        timestamps: None,
+    };
+    renderer.record_view(&mut encoder, view, &view_inputs).unwrap();
+    encoder
+}
+
+#[test]
+fn every_pass_is_made_and_recorded_on_a_device_that_grants_only_the_defaults() {
+    let descriptor = wgpu::DeviceDescriptor::default();
+    assert_eq!(descriptor.required_limits, wgpu::Limits::default());
+    let (device, queue) = wgpu::Device::noop(&descriptor);
+    let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+    for shape in [SplatShape::Tiled, SplatShape::Quads] {
+        let mut settings = small();
+        settings.splatter_config.shape = shape;
+        for name in samples::NAMES {
+            let scene = samples::by_name(name, 0.5).unwrap();
+            let mut geometry = MeshGeometry::new(&device, &queue, &scene).unwrap();
+            let mut renderer = GiRenderer::new(&device, &settings).unwrap();
+            let mut view = renderer.new_view([33, 17]).unwrap();
+            let encoder = record(&mut renderer, &mut view, &mut geometry, &scene, (&device, &queue));
+            queue.submit([encoder.finish()]);
+            renderer.place_env_maps_blocking(&queue, &mut geometry).unwrap();
+        }
+    }
+    record_the_other_passes(&device, &queue);
+    let error = pollster::block_on(scope.pop());
+    assert!(error.is_none(), "{error:?}");
+}
+
+/// Those that the renderer does not use.
+fn record_the_other_passes(device: &wgpu::Device, queue: &wgpu::Queue) {
+    let size = [9, 5];
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let radiance = Radiance::new(device, size).unwrap();
+    let mut sums = AccumulatorResources::new(device, size).unwrap();
+    let inputs = AccumulatorInputs {
+        queue,
+        radiance: &radiance,
+        timestamps: None,
+    };
+    Accumulator::new(device).record(&mut encoder, &mut sums, &inputs);
+    let target = Radiance::new(device, size).unwrap();
+    let tone_inputs = ToneMapInputs {
+        queue,
+        radiance: sums.mean(),
+        target: target.view(),
+        settings: &ToneMapSettings::default(),
+        timestamps: None,
+    };
+    let pass = ToneMap::new(device, wgpu::TextureFormat::Rgba32Float);
+    pass.record(&mut encoder, &mut ToneMapResources::new(device).unwrap(), &tone_inputs);
+    let photons = Photons::new(device, 100, 2).unwrap();
+    let mut statistics = TraceStatisticsResources::new(device, &photons).unwrap();
+    let statistics_inputs = TraceStatisticsInputs {
+        queue,
+        photons: &photons,
+        timestamps: None,
+    };
+    TraceStatistics::new(device).record(&mut encoder, &mut statistics, &statistics_inputs);
+    queue.submit([encoder.finish()]);
+}
+
+/// The frame of `record`, composed by hand from public passes and resources.
+fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], centers_from: &EnvMaps) -> Vec<[f32; 4]> {
+    let (device, queue) = (&gpu.device, &gpu.queue);
+    let summary = SceneSummary::of(scene).unwrap();
+    let frame = lightfall::scene::UnitFrame::new(&summary.bounds, summary.total_flux).unwrap();
+    let mut geometry = MeshGeometry::new(device, queue, scene).unwrap();
+    let mut lights = Lights::new(device).unwrap();
+    lights.write(queue, &frame, &scene.lights, settings.photons).unwrap();
+    let shadow_maps = ShadowMaps::new(device, &scene.lights, settings.shadow_map_size).unwrap();
+    let mut env_maps = EnvMaps::new(device, settings.env_map_count, settings.env_map_size).unwrap();
+    env_maps.set_centers(queue, centers_from.centers()).unwrap();
+    let photons = Photons::new(device, settings.photons, settings.bounces).unwrap();
+    let mut g_buffer = GBuffer::new(device, size).unwrap();
+    let irradiance = || Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float).unwrap();
+    let (direct, indirect) = (irradiance(), irradiance());
+    let radiance = Radiance::new(device, size).unwrap();
+
+    let mut camera = CameraView::new(&frame, &scene.cameras[0], size, [0.0; 2]);
+    let mut views = vec![camera.capture];
+    views.extend(shadow_maps.views(&frame, &scene.lights));
+    let maps_from = views.len();
+    views.extend(env_maps.views(CapturePurpose::EnvMap));
+    for (index, view) in (0..).zip(&mut views) {
+        view.index = index;
+    }
+    camera.capture = views[0];
+    let context = PrepareContext {
+        device,
+        queue,
+        frame: &frame,
+    };
+    geometry.prepare(&context, &views).unwrap();
+
+    let timestamps = None;
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let shadow_inputs = ShadowMapCaptureInputs {
+        shadow_maps: &shadow_maps,
+        geometry: &geometry,
+        views: &views[1..maps_from],
+        timestamps,
+    };
+    let mut shadow_depth = ShadowMapCaptureResources::new(device, settings.shadow_map_size).unwrap();
+    ShadowMapCapture::new().record(&mut encoder, &mut shadow_depth, &shadow_inputs);
+    let map_inputs = EnvMapCaptureInputs {
+        env_maps: &env_maps,
+        geometry: &geometry,
+        views: &views[maps_from..],
+        timestamps,
+    };
+    let mut map_depth = EnvMapCaptureResources::new(device, settings.env_map_size).unwrap();
+    EnvMapCapture::new().record(&mut encoder, &mut map_depth, &map_inputs);
+    let emitter_inputs = PhotonEmitterInputs {
+        queue,
+        lights: &lights,
+        shadow_maps: &shadow_maps,
+        photons: &photons,
+        sample_offset: 0,
+        timestamps,
+    };
+    let mut emitter = PhotonEmitterResources::new(device).unwrap();
+    PhotonEmitter::new(device).record(&mut encoder, &mut emitter, &emitter_inputs);
+    let tracer_inputs = ImageSpaceTracerInputs {
+        queue,
+        env_maps: &env_maps,
+        photons: &photons,
+        sample_offset: 0,
+        settings: &settings.tracer,
+        timestamps,
+    };
+    let mut tracer = ImageSpaceTracerResources::new(device).unwrap();
+    ImageSpaceTracer::new(device).record(&mut encoder, &mut tracer, &tracer_inputs);
+    let g_buffer_inputs = GBufferCaptureInputs {
+        queue,
+        geometry: &geometry,
+        view: &camera,
+        timestamps,
+    };
+    GBufferCapture::new().record(&mut encoder, &mut g_buffer, &g_buffer_inputs);
+    let direct_inputs = DirectLightInputs {
+        queue,
+        g_buffer: &g_buffer,
+        lights: &lights,
+        shadow_maps: &shadow_maps,
+        irradiance: &direct,
+        timestamps,
+    };
+    let mut direct_own = DirectLightResources::new(device).unwrap();
+    DirectLight::new(device).record(&mut encoder, &mut direct_own, &direct_inputs);
+    let unit = frame.length_scale();
+    let splatter_inputs = PhotonSplatterInputs {
+        queue,
+        photons: &photons,
+        g_buffer: &g_buffer,
+        irradiance: &indirect,
+        area: (summary.area / (unit * unit)) as f32,
+        radius: frame.radius(),
+        settings: &settings.splatter,
+        timestamps,
+    };
+    let config = settings.splatter_config;
+    let mut splatter = PhotonSplatterResources::new(device, &config, &photons, size).unwrap();
+    let pass = PhotonSplatter::new(device, &config).unwrap();
+    pass.record(&mut encoder, &mut splatter, &splatter_inputs);
+    let composite_inputs = CompositeInputs {
+        queue,
+        g_buffer: &g_buffer,
+        direct: &direct,
+        indirect: &indirect,
+        radiance: &radiance,
+        settings: &CompositeSettings {
+            output_scale: frame.output_scale(1.0).unwrap(),
+            ..Default::default()
+        },
+        timestamps,
+    };
+    let composite = Composite::new(device, wgpu::TextureFormat::Rgba32Float);
+    composite.record(&mut encoder, &mut CompositeResources::new(device).unwrap(), &composite_inputs);
+    queue.submit([encoder.finish()]);
+    read_rgba32float_blocking(device, queue, radiance.view().texture()).unwrap()
+}
+
+#[test]
+fn the_renderer_equals_the_passes_composed_by_hand_bit_for_bit() {
+    let Some(gpu) = gpu() else { return };
+    let (scene, settings, size) = (samples::cornell(0.4), small(), [40, 30]);
+    let mut geometry = MeshGeometry::new(&gpu.device, &gpu.queue, &scene).unwrap();
+    let mut renderer = GiRenderer::new(&gpu.device, &settings).unwrap();
+    let mut view = renderer.new_view(size).unwrap();
+    let encoder = record(&mut renderer, &mut view, &mut geometry, &scene, (&gpu.device, &gpu.queue));
+    gpu.queue.submit([encoder.finish()]);
+    let composed = read_rgba32float_blocking(&gpu.device, &gpu.queue, view.radiance().view().texture()).unwrap();
+    let by_hand = by_hand(&gpu, &scene, &settings, size, renderer.env_maps().unwrap());
+    assert!(composed.iter().flatten().any(|&v| v > 0.0));
+    assert!(composed == by_hand);
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn nothing_is_created_after_the_first_frame_and_memory_use_is_what_was_created() {
+    let (device, queue) = wgpu::Device::noop(&wgpu::DeviceDescriptor::default());
+    let scene = samples::cornell(0.0);
+    let before = creation_count();
+    let mut geometry = MeshGeometry::new(&device, &queue, &scene).unwrap();
+    let mut renderer = GiRenderer::new(&device, &small()).unwrap();
+    let mut view = renderer.new_view([64, 48]).unwrap();
+    let frame = |time: f64, renderer: &mut GiRenderer, view: &mut ViewResources, geometry: &mut MeshGeometry| {
+        let scene = samples::cornell(time);
+        for (index, instance) in scene.instances.iter().enumerate() {
+            geometry.set_transform(index, instance.transform).unwrap();
+        }
+        let encoder = record(renderer, view, geometry, &scene, (&device, &queue));
+        queue.submit([encoder.finish()]);
+    };
+    frame(0.0, &mut renderer, &mut view, &mut geometry);
+    let settled = creation_count();
+    let in_use = renderer.memory_use() + view.memory_use() + geometry.memory_use();
+    // The one-entry view buffer that the geometry started with was replaced when the views of the frame were known.
+    let replaced = 256;
+    assert_eq!(settled.bytes - before.bytes, in_use + replaced);
+    for step in 1..4 {
+        frame(0.3 * f64::from(step), &mut renderer, &mut view, &mut geometry);
+    }
+    let later = creation_count();
+    assert!(later.passes > settled.passes);
+    assert_eq!(
+        lightfall::CreationCount {
+            passes: settled.passes,
+            ..later
+        },
+        settled
+    );
+}
+
+#[test]
+fn a_stage_that_is_not_needed_allocates_and_records_nothing_and_changes_no_pixel() {
+    let Some(gpu) = gpu() else { return };
+    let mut black = samples::cornell(0.0);
+    for material in &mut black.materials {
+        material.base_color = [0.0; 3];
+    }
+    let mut unlit = samples::cornell(0.0);
+    unlit.lights.clear();
+    unlit.materials.push(Material::default());
+    let lit = samples::cornell(0.0);
+    let passes = |scene: &Scene, settings: &Settings| {
+        let mut offline = Offline::new(&gpu, scene.clone(), settings, 0, [16, 16], Component::All).unwrap();
+        let before = creation_count().passes;
+        offline.render_frame(None).unwrap();
+        let bytes: u64 = offline.memory_by_resource().iter().map(|r| r.1).sum();
+        let plan = offline.renderer.plan().unwrap().clone();
+        (creation_count().passes - before, bytes, plan, offline.read().unwrap())
+    };
+    let all = passes(&lit, &small());
+    let no_bounces = passes(&lit, &Settings { bounces: 0, ..small() });
+    let direct_only = offline::render(&gpu, &lit, &small(), [16, 16], Component::Direct).unwrap();
+    assert!(all.2.is_on(Stage::PhotonSplatter) && !no_bounces.2.is_on(Stage::PhotonSplatter));
+    // 18 environment-map faces, emission, walk, splatting.
+    assert_eq!(all.0 - no_bounces.0, 18 + 3);
+    assert!(no_bounces.1 < all.1 / 2, "{} of {} bytes", no_bounces.1, all.1);
+    assert!(no_bounces.3 == direct_only, "direct light is the same without the indirect stages");
+    let black = passes(&black, &small());
+    assert_eq!(black.0, no_bounces.0);
+    assert!(black.3.iter().flatten().all(|&v| v == 0.0));
+    // G-buffer and composite only.
+    let unlit = passes(&unlit, &small());
+    assert_eq!(unlit.0, 2);
+    assert!(unlit.3.iter().flatten().all(|&v| v == 0.0));
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn the_energy_of_every_hop_adds_up() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::cornell(0.0);
+    let mut offline = Offline::new(&gpu, scene.clone(), &small(), 0, [8, 8], Component::All).unwrap();
+    offline.render_frame(None).unwrap();
+    let hops = offline.statistics().unwrap();
+    assert_eq!(hops.len(), 4);
+    let frame = offline.renderer.frame().unwrap();
+    let flux = scene.lights[0].flux(1.0);
+    for channel in 0..3 {
+        let emitted = f64::from(hops[0].emitted[channel]) * frame.flux_scale();
+        assert!((emitted / flux[channel] - 1.0).abs() < 1e-5, "{emitted} of {}", flux[channel]);
+        for pair in hops.windows(2) {
+            let passed_on = pair[0].stored[channel] - pair[0].absorbed[channel];
+            let error = (pair[1].emitted[channel] / passed_on - 1.0).abs();
+            assert!(error < 1e-4, "hop: {error}");
+        }
+    }
+    println!("{hops:#?}");
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn long_walks_end_and_keep_their_energy_with_roulette() {
+    let Some(gpu) = gpu() else { return };
+    let settings = Settings {
+        bounces: 64,
+        photons: 20_000,
+        ..small()
+    };
+    let mut offline = Offline::new(&gpu, samples::cornell(0.0), &settings, 0, [8, 8], Component::All).unwrap();
+    offline.render_frame(None).unwrap();
+    let hops = offline.statistics().unwrap();
+    assert_eq!(hops.len(), 65);
+    // Scattering 4 is the first that roulette may end: flux is kept on average, paths are not.
+    let (before, after) = (&hops[3], &hops[4]);
+    let passed_on: f32 = (0..3).map(|c| before.stored[c] - before.absorbed[c]).sum();
+    let ratio = after.emitted.iter().sum::<f32>() / passed_on;
+    println!("flux after roulette over before: {ratio:.3}; paths {} of {}", after.stored_count, before.stored_count);
+    assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+    assert!(f64::from(after.stored_count as u32) < 0.75 * before.stored_count as f64);
+    assert_eq!(hops[64].stored_count, 0, "no path of these albedos survives 64 scatterings");
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn a_mesh_that_the_host_deforms_is_seen_where_it_went() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::plane();
+    let mut offline = Offline::new(&gpu, scene, &small(), 0, [8, 8], Component::Direct).unwrap();
+    offline.render_frame(None).unwrap();
+    let flat = offline.read().unwrap();
+    // Positions of the plane's four vertices, lowered by 1 m: the light is now twice as far above the middle.
+    let buffer = offline.geometry.deform(0).unwrap().clone();
+    for (vertex, corner) in [[-100.0f32, 100.0], [100.0, 100.0], [100.0, -100.0], [-100.0, -100.0]].iter().enumerate() {
+        let position = [corner[0], -1.0, corner[1]];
+        let offset = vertex as u64 * MeshGeometry::VERTEX_BYTES;
+        gpu.queue.write_buffer(&buffer, offset, bytemuck::cast_slice(&position));
+    }
+    offline.render_frame(None).unwrap();
+    let lowered = offline.read().unwrap();
+    let middle = 8 * 4 + 4;
+    println!("{} then {}", flat[middle][0], lowered[middle][0]);
+    // Pixel (4, 4) looks half a pixel off the axis: 2 m and 3 m below, 0.25 m and 0.375 m aside in x and z.
+    let expected = |height: f64, aside: f64| {
+        let r2 = height * height + 2.0 * aside * aside;
+        0.5 / std::f64::consts::PI * 10.0 * height / (r2 * r2.sqrt())
+    };
+    for (pixel, wanted) in [(flat[middle], expected(1.0, 0.25)), (lowered[middle], expected(2.0, 0.375))] {
+        assert!((f64::from(pixel[0]) / wanted - 1.0).abs() < 1e-3, "{} against {wanted}", pixel[0]);
+    }
+    assert!(offline.geometry.deform(7).is_none());
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn two_views_of_one_scene_share_its_photons() {
+    let Some(gpu) = gpu() else { return };
+    let (device, queue) = (&gpu.device, &gpu.queue);
+    let scene = samples::cornell(0.0);
+    let mut geometry = MeshGeometry::new(device, queue, &scene).unwrap();
+    let mut renderer = GiRenderer::new(device, &small()).unwrap();
+    let summary = SceneSummary::of(&scene).unwrap();
+    let frame = renderer.set_scene(queue, &summary, &scene.lights).unwrap();
+    let sizes = [[32, 32], [24, 16]];
+    let mut views = sizes.map(|size| renderer.new_view(size).unwrap());
+    let mut cameras = sizes.map(|size| CameraView::new(&frame, &scene.cameras[0], size, [0.0; 2]));
+    renderer.prepare(queue, &mut geometry, &mut cameras).unwrap();
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let before = creation_count().passes;
+    let scene_inputs = SceneInputs {
+        queue,
+        geometry: &geometry,
+        sample_offset: 0,
+        timestamps: None,
+    };
+    renderer.record_scene(&mut encoder, &scene_inputs);
+    // Six shadow faces, 18 map faces, emission, walk.
+    assert_eq!(creation_count().passes - before, 6 + 18 + 2);
+    for (view, camera) in views.iter_mut().zip(&cameras) {
+        let inputs = ViewInputs {
+            queue,
+            geometry: &geometry,
+            view: camera,
+            composite: &CompositeSettings::default(),
+            timestamps: None,
+        };
+        renderer.record_view(&mut encoder, view, &inputs).unwrap();
+    }
+    // G-buffer, direct light, splatting, composite, twice.
+    assert_eq!(creation_count().passes - before, 26 + 8);
+    queue.submit([encoder.finish()]);
+    for view in &views {
+        let pixels = read_rgba32float_blocking(device, queue, view.radiance().view().texture()).unwrap();
+        assert!(pixels.iter().filter(|p| p[0] > 0.0).count() > pixels.len() / 2);
+    }
+    assert_no_errors(&gpu);
+}

@@ -1,0 +1,289 @@
+//! Density estimation against arithmetic: photons that the test itself made, on a plane of a G-buffer that the test itself
+//! made. Also what a host does that plugs in this one stage.
+
+mod common;
+
+use common::{Gpu, Random, Wishes, assert_no_errors, gpu, gpu_with};
+use lightfall::pass::{
+    Bandwidth, Kernel, PhotonSplatter, PhotonSplatterConfig, PhotonSplatterInputs, PhotonSplatterResources,
+    PhotonSplatterSettings, SplatShape,
+};
+use lightfall::resource::{CameraView, GBuffer, GBufferViews, Irradiance, NormalEncoding, Photon, Photons};
+use lightfall::{read_rgba32float_blocking, wgpu};
+
+const SIZE: u32 = 64;
+
+/// The plane z = 0 seen along −z: x and y in [−1, 1] fill the view.
+fn plane_g_buffer(gpu: &Gpu) -> GBuffer {
+    let texture = |format: wgpu::TextureFormat, texel: &[u8]| {
+        let size = wgpu::Extent3d {
+            width: SIZE,
+            height: SIZE,
+            depth_or_array_layers: 1,
+        };
+        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size,
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        });
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(SIZE * texel.len() as u32),
+            rows_per_image: None,
+        };
+        let texels = texel.repeat((SIZE * SIZE) as usize);
+        gpu.queue.write_texture(texture.as_image_copy(), &texels, layout, size);
+        texture.create_view(&Default::default())
+    };
+    use wgpu::TextureFormat as F;
+    let views = GBufferViews {
+        depth: texture(F::R32Float, &0.5f32.to_ne_bytes()),
+        // +z as × 0.5 + 0.5; 128 / 255 is as near to zero as eight bits come.
+        normal: texture(F::Rgba8Unorm, &[128, 128, 255, 0]),
+        normal_encoding: NormalEncoding::HalfOffset,
+        base_color: texture(F::Rgba8Unorm, &[255; 4]),
+        emission: texture(F::Rgba8Unorm, &[0; 4]),
+        rectangle: None,
+    };
+    let mut g_buffer = GBuffer::from_views(&gpu.device, views).unwrap();
+    // Depth 0.5 + 0.5 z.
+    let matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.5, 0.0], [0.0, 0.0, 0.5, 1.0]];
+    let view = CameraView::from_matrix(matrix, [0.0, 0.0, -1.0, 0.0], SIZE as f32);
+    g_buffer.set_view(&gpu.queue, &view);
+    g_buffer
+}
+
+/// A photon of this flux on the plane; normal +z is octahedral (0, 0).
+fn photon(x: f64, y: f64, flux: [f32; 3]) -> Photon {
+    Photon {
+        position: [x as f32, y as f32, 0.0],
+        state: 1,
+        flux,
+        density: 1.0,
+        normal: 0,
+        direction: 0,
+        reflectance: 0,
+        light: 0,
+    }
+}
+
+/// Irradiance of every pixel from these photons, RGB.
+fn splat(gpu: &Gpu, config: PhotonSplatterConfig, photons: &[Photon], radius: f32) -> Vec<[f32; 4]> {
+    let count = photons.len() as u32;
+    // Hop 0 is direct light and stays out: photons are hop 1 of as many paths.
+    let resource = Photons::new(&gpu.device, count, 1).unwrap();
+    let offset = u64::from(count) * lightfall::resource::PHOTON_BYTES;
+    gpu.queue
+        .write_buffer(resource.buffer(), offset, bytemuck::cast_slice(photons));
+    let g_buffer = plane_g_buffer(gpu);
+    let pass = PhotonSplatter::new(&gpu.device, &config).unwrap();
+    let mut resources = PhotonSplatterResources::new(&gpu.device, &config, &resource, [SIZE; 2]).unwrap();
+    let irradiance = Irradiance::new(&gpu.device, [SIZE; 2], config.format()).unwrap();
+    let settings = PhotonSplatterSettings {
+        bandwidth: Bandwidth::Fixed(radius),
+        ..Default::default()
+    };
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let inputs = PhotonSplatterInputs {
+        queue: &gpu.queue,
+        photons: &resource,
+        g_buffer: &g_buffer,
+        irradiance: &irradiance,
+        area: 4.0,
+        radius: 1.0,
+        settings: &settings,
+        timestamps: None,
+    };
+    pass.record(&mut encoder, &mut resources, &inputs);
+    gpu.queue.submit([encoder.finish()]);
+    read(gpu, &irradiance)
+}
+
+/// Reads either format through `rgba32float`.
+fn read(gpu: &Gpu, irradiance: &Irradiance) -> Vec<[f32; 4]> {
+    if irradiance.format() == wgpu::TextureFormat::Rgba32Float {
+        return read_rgba32float_blocking(&gpu.device, &gpu.queue, irradiance.view().texture()).unwrap();
+    }
+    let wide = Irradiance::new(&gpu.device, irradiance.size(), wgpu::TextureFormat::Rgba32Float).unwrap();
+    let blitter = wgpu::util::TextureBlitter::new(&gpu.device, wgpu::TextureFormat::Rgba32Float);
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    blitter.copy(&gpu.device, &mut encoder, irradiance.view(), wide.view());
+    gpu.queue.submit([encoder.finish()]);
+    read_rgba32float_blocking(&gpu.device, &gpu.queue, wide.view().texture()).unwrap()
+}
+
+/// Photons of equal flux, one watt in all, at random in the middle quarter of the view, so that no kernel hangs over.
+fn square_of_photons(count: u32) -> Vec<Photon> {
+    let mut random = Random(11);
+    let flux = [1.0 / count as f32; 3];
+    (0..count)
+        .map(|_| photon(random.unit() - 0.5, random.unit() - 0.5, flux))
+        .collect()
+}
+
+/// Flux that arrives: sum over pixels of irradiance times pixel area.
+fn arriving(pixels: &[[f32; 4]]) -> f64 {
+    let pixel_area = (2.0 / f64::from(SIZE)).powi(2);
+    pixels.iter().map(|p| f64::from(p[0])).sum::<f64>() * pixel_area
+}
+
+/// Eight pixels.
+const RADIUS: f32 = 0.25;
+
+/// So many photons that this many kernels overlap in the middle of the square of area 1.
+fn photons_for_overlap(overlap: f64) -> u32 {
+    (overlap / (std::f64::consts::PI * f64::from(RADIUS * RADIUS))).round() as u32
+}
+
+fn config(shape: SplatShape) -> PhotonSplatterConfig {
+    PhotonSplatterConfig {
+        shape,
+        ..Default::default()
+    }
+}
+
+#[test]
+fn every_kernel_integrates_to_one() {
+    let Some(gpu) = gpu() else { return };
+    for kernel in [Kernel::Constant, Kernel::Cone, Kernel::Epanechnikov] {
+        // 24 pixels, at 2000 places within a pixel: the error of sampling a disc at pixel centres averages out.
+        let config = PhotonSplatterConfig {
+            kernel,
+            ..Default::default()
+        };
+        let mut random = Random(5);
+        let photons: Vec<_> = (0..2000)
+            .map(|_| photon(random.unit() / 32.0, random.unit() / 32.0, [5e-4; 3]))
+            .collect();
+        let sum = arriving(&splat(&gpu, config, &photons, 0.74));
+        println!("{kernel:?}: {sum:.5}");
+        assert!((sum - 1.0).abs() < 1e-3, "{kernel:?}: {sum}");
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn tiles_keep_all_energy_at_any_number_of_photons_a_pixel() {
+    let Some(gpu) = gpu() else { return };
+    for overlap in [1.0, 100.0, 10_000.0] {
+        let photons = square_of_photons(photons_for_overlap(overlap));
+        let sum = arriving(&splat(&gpu, config(SplatShape::Tiled), &photons, RADIUS));
+        println!("{overlap} photons a pixel: {sum:.5}");
+        assert!((sum - 1.0).abs() < 5e-3, "{overlap}: {sum}");
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn quads_in_sixteen_bits_lose_no_more_than_rounding_until_they_stagnate() {
+    let Some(gpu) = gpu() else { return };
+    for overlap in [1.0, 100.0, 10_000.0] {
+        let photons = square_of_photons(photons_for_overlap(overlap));
+        let sum = arriving(&splat(&gpu, config(SplatShape::Quads), &photons, RADIUS));
+        println!("{overlap} photons a pixel: {sum:.5}");
+        if overlap <= 100.0 {
+            // Each addition may cut off a whole step of eleven bits, and a sum holds about `overlap` of them.
+            let rounding = overlap / 2048.0;
+            assert!((sum - 1.0).abs() < 5e-3 + rounding, "{overlap}: {sum}");
+        } else {
+            // The documented limit of the format: if this fails, the documentation is out of date.
+            assert!(sum < 0.99, "sixteen-bit sums no longer stagnate: {sum}");
+        }
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn quads_in_thirty_two_bits_keep_all_energy_where_the_device_blends_them() {
+    let config = PhotonSplatterConfig {
+        shape: SplatShape::Quads,
+        blend_format: Some(wgpu::TextureFormat::Rgba32Float),
+        ..Default::default()
+    };
+    let features = PhotonSplatter::required_features(&config);
+    let wishes = Wishes {
+        features,
+        ..Default::default()
+    };
+    if Gpu::open(None, wishes).is_err() {
+        println!("skipped: no adapter with {features:?}");
+        return;
+    }
+    let Some(gpu) = gpu_with(wishes) else { return };
+    for overlap in [1.0, 100.0, 10_000.0] {
+        let photons = square_of_photons(photons_for_overlap(overlap));
+        let sum = arriving(&splat(&gpu, config, &photons, RADIUS));
+        println!("{overlap} photons a pixel: {sum:.5}");
+        assert!((sum - 1.0).abs() < 5e-3, "{overlap}: {sum}");
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn a_photon_gives_each_pixel_what_its_kernel_says() {
+    let Some(gpu) = gpu() else { return };
+    let (x, y, h) = (0.013, -0.021, 0.3f64);
+    let pixels = splat(&gpu, config(SplatShape::Tiled), &[photon(x, y, [1.0, 0.5, 0.25])], h as f32);
+    for (i, pixel) in (0..).zip(&pixels) {
+        let at = |k: u32| (f64::from(k) + 0.5) / f64::from(SIZE) * 2.0 - 1.0;
+        let (dx, dy) = (at(i % SIZE) - x, -at(i / SIZE) - y);
+        let q = (dx * dx + dy * dy) / (h * h);
+        let expected = if q < 1.0 { 2.0 / std::f64::consts::PI * (1.0 - q) / (h * h) } else { 0.0 };
+        for (channel, share) in [(0, 1.0), (1, 0.5), (2, 0.25)] {
+            let error = (f64::from(pixel[channel]) - expected * share).abs();
+            assert!(error < 1e-5 * 2.0 / (std::f64::consts::PI * h * h), "pixel {i}: {error}");
+        }
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn one_light_a_billion_times_brighter_than_another_leaves_both_right() {
+    let Some(gpu) = gpu() else { return };
+    // Far apart: each in tiles of its own.
+    let photons = [photon(-0.6, 0.0, [1.0; 3]), photon(0.6, 0.0, [1e-9; 3])];
+    let pixels = splat(&gpu, config(SplatShape::Tiled), &photons, 0.2);
+    let half = |right: bool| {
+        let kept = (0..).zip(&pixels).filter(|(i, _)| (i % SIZE >= SIZE / 2) == right);
+        kept.map(|(_, p)| f64::from(p[0])).sum::<f64>() * (2.0 / f64::from(SIZE)).powi(2)
+    };
+    let (bright, dim) = (half(false), half(true) * 1e9);
+    println!("bright {bright:.4}, dim {dim:.4}");
+    assert!((bright - 1.0).abs() < 0.02 && (dim / bright - 1.0).abs() < 1e-3);
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn the_order_of_photons_changes_no_bit() {
+    let Some(gpu) = gpu() else { return };
+    let mut photons = square_of_photons(3000);
+    let forward = splat(&gpu, config(SplatShape::Tiled), &photons, RADIUS);
+    photons.reverse();
+    let backward = splat(&gpu, config(SplatShape::Tiled), &photons, RADIUS);
+    assert!(forward == backward);
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn a_photon_on_the_other_side_gives_nothing() {
+    let Some(gpu) = gpu() else { return };
+    // −z is octahedral (1, 1): both coordinates 32767.
+    let below = Photon {
+        normal: 0x7fff_7fff,
+        ..photon(0.0, 0.0, [1.0; 3])
+    };
+    let above = Photon {
+        position: [0.0, 0.0, 0.2],
+        ..photon(0.0, 0.0, [1.0; 3])
+    };
+    for (what, p) in [("behind the plane", below), ("on a plane above", above)] {
+        let sum = arriving(&splat(&gpu, config(SplatShape::Tiled), &[p], 0.3));
+        assert_eq!(sum, 0.0, "{what}");
+    }
+    assert_no_errors(&gpu);
+}
