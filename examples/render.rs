@@ -15,7 +15,7 @@ use common::offline::{Component, Offline};
 use common::{exr_file, gltf_scene, picture};
 use lightfall::Timestamps;
 use lightfall::frame::{GiRenderer, Plan, Settings};
-use lightfall::scene::{Scene, SceneSummary, UnitFrame, samples};
+use lightfall::scene::{Scene, SceneSummary, samples};
 use serde_json::{Value, json};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -193,7 +193,7 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         ));
     }
     if let Some(path) = &arguments.stats {
-        let report = report(&gpu, &offline, &summary, &settings, &clock)?;
+        let report = report(&gpu, &offline, &settings, &clock)?;
         let text = serde_json::to_string_pretty(&report).map_err(|e| e.to_string())?;
         exr_file::replace_file(path, text.as_bytes())?;
     }
@@ -376,15 +376,9 @@ fn median(values: &[f64]) -> f64 {
     sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
-fn report(
-    gpu: &Gpu,
-    offline: &Offline<'_>,
-    summary: &SceneSummary,
-    settings: &Settings,
-    clock: &Clock,
-) -> Result<Value, String> {
-    let frame = UnitFrame::new(&summary.bounds, summary.total_flux).map_err(|e| e.to_string())?;
-    let watts = |flux: [f32; 3]| flux.map(|v| f64::from(v) * frame.flux_scale());
+fn report(gpu: &Gpu, offline: &Offline<'_>, settings: &Settings, clock: &Clock) -> Result<Value, String> {
+    let flux_scale = offline.renderer.frame().map_or(1.0, |f| f.flux_scale());
+    let watts = |flux: [f32; 3]| flux.map(|v| f64::from(v) * flux_scale);
     let hops = offline.statistics().map_err(|e| e.to_string())?;
     let energy: Vec<Value> = (0..)
         .zip(&hops)

@@ -229,7 +229,11 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
         timestamps,
     };
     let composite = Composite::new(device, wgpu::TextureFormat::Rgba32Float);
-    composite.record(&mut encoder, &mut CompositeResources::new(device).unwrap(), &composite_inputs);
+    composite.record(
+        &mut encoder,
+        &mut CompositeResources::new(device).unwrap(),
+        &composite_inputs,
+    );
     queue.submit([encoder.finish()]);
     read_rgba32float_blocking(device, queue, radiance.view().texture()).unwrap()
 }
@@ -241,7 +245,13 @@ fn the_renderer_equals_the_passes_composed_by_hand_bit_for_bit() {
     let mut geometry = MeshGeometry::new(&gpu.device, &gpu.queue, &scene).unwrap();
     let mut renderer = GiRenderer::new(&gpu.device, &settings).unwrap();
     let mut view = renderer.new_view(size).unwrap();
-    let encoder = record(&mut renderer, &mut view, &mut geometry, &scene, (&gpu.device, &gpu.queue));
+    let encoder = record(
+        &mut renderer,
+        &mut view,
+        &mut geometry,
+        &scene,
+        (&gpu.device, &gpu.queue),
+    );
     gpu.queue.submit([encoder.finish()]);
     let composed = read_rgba32float_blocking(&gpu.device, &gpu.queue, view.radiance().view().texture()).unwrap();
     let by_hand = by_hand(&gpu, &scene, &settings, size, renderer.env_maps().unwrap());
@@ -312,7 +322,10 @@ fn a_stage_that_is_not_needed_allocates_and_records_nothing_and_changes_no_pixel
     // 18 environment-map faces, emission, walk, splatting.
     assert_eq!(all.0 - no_bounces.0, 18 + 3);
     assert!(no_bounces.1 < all.1 / 2, "{} of {} bytes", no_bounces.1, all.1);
-    assert!(no_bounces.3 == direct_only, "direct light is the same without the indirect stages");
+    assert!(
+        no_bounces.3 == direct_only,
+        "direct light is the same without the indirect stages"
+    );
     let black = passes(&black, &small());
     assert_eq!(black.0, no_bounces.0);
     assert!(black.3.iter().flatten().all(|&v| v == 0.0));
@@ -335,7 +348,11 @@ fn the_energy_of_every_hop_adds_up() {
     let flux = scene.lights[0].flux(1.0);
     for channel in 0..3 {
         let emitted = f64::from(hops[0].emitted[channel]) * frame.flux_scale();
-        assert!((emitted / flux[channel] - 1.0).abs() < 1e-5, "{emitted} of {}", flux[channel]);
+        assert!(
+            (emitted / flux[channel] - 1.0).abs() < 1e-5,
+            "{emitted} of {}",
+            flux[channel]
+        );
         for pair in hops.windows(2) {
             let passed_on = pair[0].stored[channel] - pair[0].absorbed[channel];
             let error = (pair[1].emitted[channel] / passed_on - 1.0).abs();
@@ -362,10 +379,16 @@ fn long_walks_end_and_keep_their_energy_with_roulette() {
     let (before, after) = (&hops[3], &hops[4]);
     let passed_on: f32 = (0..3).map(|c| before.stored[c] - before.absorbed[c]).sum();
     let ratio = after.emitted.iter().sum::<f32>() / passed_on;
-    println!("flux after roulette over before: {ratio:.3}; paths {} of {}", after.stored_count, before.stored_count);
+    println!(
+        "flux after roulette over before: {ratio:.3}; paths {} of {}",
+        after.stored_count, before.stored_count
+    );
     assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
     assert!(f64::from(after.stored_count as u32) < 0.75 * before.stored_count as f64);
-    assert_eq!(hops[64].stored_count, 0, "no path of these albedos survives 64 scatterings");
+    assert_eq!(
+        hops[64].stored_count, 0,
+        "no path of these albedos survives 64 scatterings"
+    );
     assert_no_errors(&gpu);
 }
 
@@ -378,7 +401,10 @@ fn a_mesh_that_the_host_deforms_is_seen_where_it_went() {
     let flat = offline.read().unwrap();
     // Positions of the plane's four vertices, lowered by 1 m: the light is now twice as far above the middle.
     let buffer = offline.geometry.deform(0).unwrap().clone();
-    for (vertex, corner) in [[-100.0f32, 100.0], [100.0, 100.0], [100.0, -100.0], [-100.0, -100.0]].iter().enumerate() {
+    for (vertex, corner) in [[-100.0f32, 100.0], [100.0, 100.0], [100.0, -100.0], [-100.0, -100.0]]
+        .iter()
+        .enumerate()
+    {
         let position = [corner[0], -1.0, corner[1]];
         let offset = vertex as u64 * MeshGeometry::VERTEX_BYTES;
         gpu.queue.write_buffer(&buffer, offset, bytemuck::cast_slice(&position));
@@ -392,8 +418,15 @@ fn a_mesh_that_the_host_deforms_is_seen_where_it_went() {
         let r2 = height * height + 2.0 * aside * aside;
         0.5 / std::f64::consts::PI * 10.0 * height / (r2 * r2.sqrt())
     };
-    for (pixel, wanted) in [(flat[middle], expected(1.0, 0.25)), (lowered[middle], expected(2.0, 0.375))] {
-        assert!((f64::from(pixel[0]) / wanted - 1.0).abs() < 1e-3, "{} against {wanted}", pixel[0]);
+    for (pixel, wanted) in [
+        (flat[middle], expected(1.0, 0.25)),
+        (lowered[middle], expected(2.0, 0.375)),
+    ] {
+        assert!(
+            (f64::from(pixel[0]) / wanted - 1.0).abs() < 1e-3,
+            "{} against {wanted}",
+            pixel[0]
+        );
     }
     assert!(offline.geometry.deform(7).is_none());
     assert_no_errors(&gpu);

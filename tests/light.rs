@@ -151,7 +151,10 @@ fn a_closed_door_keeps_indirect_light_out() {
     let Some(gpu) = gpu() else { return };
     for method in [TraceMethod::Paper, TraceMethod::Plane, TraceMethod::OrderedMarch] {
         let (open, closed) = (far_floor(&gpu, method, 2.0), far_floor(&gpu, method, 0.0));
-        println!("{method:?}: open {open:.3e}, closed {closed:.3e}, {:.3} %", 100.0 * closed / open);
+        println!(
+            "{method:?}: open {open:.3e}, closed {closed:.3e}, {:.3} %",
+            100.0 * closed / open
+        );
         // The paper's tracer is measured, not held to it: its hits may lie behind walls.
         if method != TraceMethod::Paper {
             assert!(closed <= 0.01 * open, "{method:?}: {closed} against {open}");
@@ -306,7 +309,11 @@ fn flux_of_every_light_is_the_integral_of_its_intensity() {
     let (inner, outer) = (0.4f64.cos(), 1.1f64.cos());
     let count = 400_000;
     let sum: f64 = (0..count)
-        .map(|_| ((1.0 - 2.0 * random.unit() - outer) / (inner - outer)).clamp(0.0, 1.0).powi(2))
+        .map(|_| {
+            ((1.0 - 2.0 * random.unit() - outer) / (inner - outer))
+                .clamp(0.0, 1.0)
+                .powi(2)
+        })
         .sum();
     let integral = 3.0 * 4.0 * std::f64::consts::PI * sum / f64::from(count);
     let flux = light.flux(1.0).x;

@@ -52,7 +52,12 @@ fn plane_g_buffer(gpu: &Gpu) -> GBuffer {
     };
     let mut g_buffer = GBuffer::from_views(&gpu.device, views).unwrap();
     // Depth 0.5 + 0.5 z.
-    let matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.5, 0.0], [0.0, 0.0, 0.5, 1.0]];
+    let matrix = [
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0],
+        [0.0, 0.0, 0.5, 0.0],
+        [0.0, 0.0, 0.5, 1.0],
+    ];
     let view = CameraView::from_matrix(matrix, [0.0, 0.0, -1.0, 0.0], SIZE as f32);
     g_buffer.set_view(&gpu.queue, &view);
     g_buffer
@@ -228,15 +233,27 @@ fn quads_in_thirty_two_bits_keep_all_energy_where_the_device_blends_them() {
 fn a_photon_gives_each_pixel_what_its_kernel_says() {
     let Some(gpu) = gpu() else { return };
     let (x, y, h) = (0.013, -0.021, 0.3f64);
-    let pixels = splat(&gpu, config(SplatShape::Tiled), &[photon(x, y, [1.0, 0.5, 0.25])], h as f32);
+    let pixels = splat(
+        &gpu,
+        config(SplatShape::Tiled),
+        &[photon(x, y, [1.0, 0.5, 0.25])],
+        h as f32,
+    );
     for (i, pixel) in (0..).zip(&pixels) {
         let at = |k: u32| (f64::from(k) + 0.5) / f64::from(SIZE) * 2.0 - 1.0;
         let (dx, dy) = (at(i % SIZE) - x, -at(i / SIZE) - y);
         let q = (dx * dx + dy * dy) / (h * h);
-        let expected = if q < 1.0 { 2.0 / std::f64::consts::PI * (1.0 - q) / (h * h) } else { 0.0 };
+        let expected = if q < 1.0 {
+            2.0 / std::f64::consts::PI * (1.0 - q) / (h * h)
+        } else {
+            0.0
+        };
         for (channel, share) in [(0, 1.0), (1, 0.5), (2, 0.25)] {
             let error = (f64::from(pixel[channel]) - expected * share).abs();
-            assert!(error < 1e-5 * 2.0 / (std::f64::consts::PI * h * h), "pixel {i}: {error}");
+            assert!(
+                error < 1e-5 * 2.0 / (std::f64::consts::PI * h * h),
+                "pixel {i}: {error}"
+            );
         }
     }
     assert_no_errors(&gpu);

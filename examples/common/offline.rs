@@ -46,11 +46,11 @@ impl<'a> Offline<'a> {
         let (device, queue) = (&gpu.device, &gpu.queue);
         let mut geometry = MeshGeometry::new(device, queue, &scene)?;
         let mut renderer = GiRenderer::new(device, settings)?;
-        let frame = renderer.set_scene(queue, &SceneSummary::of(&scene)?, &scene.lights)?;
+        renderer.set_scene(queue, &SceneSummary::of(&scene)?, &scene.lights)?;
         renderer.place_env_maps_blocking(queue, &mut geometry)?;
         let weight = |on: bool| if on { 1.0 } else { 0.0 };
         let composite = CompositeSettings {
-            output_scale: frame.output_scale(1.0)?,
+            output_scale: 1.0,
             direct: weight(component != Component::Indirect),
             emission: weight(component != Component::Indirect),
             indirect: weight(component != Component::Direct),
@@ -80,6 +80,7 @@ impl<'a> Offline<'a> {
         let frame = self
             .renderer
             .set_scene(queue, &SceneSummary::of(&self.scene)?, &self.scene.lights)?;
+        self.composite.output_scale = frame.output_scale(1.0)?;
         let jitter = match self.accumulator {
             Some(_) => [
                 radical_inverse(self.frames + 1, 2) - 0.5,

@@ -195,10 +195,17 @@ impl GiRenderer {
         if let Some(direct) = &mut self.direct {
             direct.lights.write(queue, &frame, lights, self.settings.photons)?;
         }
-        if let Some(indirect) = &mut self.indirect
-            && (indirect.env_maps.centers().is_empty() || self.state.as_ref().is_none_or(|s| s.frame != frame))
-        {
-            let centers = EnvMapSelector::candidates(state.min, state.max, self.settings.env_map_count);
+        if let Some(indirect) = &mut self.indirect {
+            let centers = indirect.env_maps.centers();
+            let centers = match &self.state {
+                Some(old) if !centers.is_empty() && old.frame == frame => centers.to_vec(),
+                // Maps stay where they are in the world when the frame is renewed.
+                Some(old) if !centers.is_empty() => {
+                    let world = centers.iter().map(|&c| old.frame.world_point(c));
+                    world.map(|c| frame.point(c)).collect()
+                }
+                _ => EnvMapSelector::candidates(state.min, state.max, self.settings.env_map_count),
+            };
             indirect.env_maps.set_centers(queue, &centers)?;
         }
         self.state = Some(state);

@@ -20,6 +20,9 @@ pub(crate) mod gpu {
     }
 }
 
+/// Bindings of `shaders/pass/accumulator.wgsl`, in order.
+pub(crate) const SLOTS: [Slot; 3] = [Slot::Uniform, Slot::Texture, Slot::Texture];
+
 /// The pass.
 #[derive(Debug)]
 pub struct Accumulator {
@@ -52,10 +55,9 @@ impl Accumulator {
 
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
-        let slots = [Slot::Uniform, Slot::Texture, Slot::Texture];
         let formats = [Self::FORMAT; 2];
         Self {
-            pass: FullScreen::new(device, "lightfall::Accumulator", wgsl::ACCUMULATOR, &slots, &formats),
+            pass: FullScreen::new(device, "lightfall::Accumulator", wgsl::ACCUMULATOR, &SLOTS, &formats),
         }
     }
 

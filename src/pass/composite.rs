@@ -23,6 +23,16 @@ pub(crate) mod gpu {
     }
 }
 
+/// Bindings of `shaders/pass/composite.wgsl`, in order.
+pub(crate) const SLOTS: [Slot; 6] = [
+    Slot::Uniform,
+    Slot::Uniform,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::Texture,
+];
+
 /// Which parts of the light to show, and how bright.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CompositeSettings {
@@ -82,16 +92,8 @@ pub struct CompositeInputs<'a> {
 impl Composite {
     /// The pass for targets of `format`: `rgba32float` unscaled, or a narrower one with a pre-exposure.
     pub fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
-        let slots = [
-            Slot::Uniform,
-            Slot::Uniform,
-            Slot::Texture,
-            Slot::Texture,
-            Slot::Texture,
-            Slot::Texture,
-        ];
         Self {
-            pass: FullScreen::new(device, "lightfall::Composite", wgsl::COMPOSITE, &slots, &[format]),
+            pass: FullScreen::new(device, "lightfall::Composite", wgsl::COMPOSITE, &SLOTS, &[format]),
         }
     }
 

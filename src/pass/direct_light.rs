@@ -3,8 +3,8 @@
 //! Inputs: [`GBuffer`], [`Lights`], [`ShadowMaps`]. Output: [`Irradiance`] (`rgba32float`). Cost: pixels × lights that
 //! face them, one texel fetch each. A receiver is lit where it lies no further than the plane of the surface that its
 //! shadow-map texel holds, so flat surfaces need no bias. Source: deferred shading as in Yao et al. 2010, section 7.
-//! Limits: the extent of a light is ignored; geometry further than two region radii towards a directional light does not
-//! shade.
+//! Limits: the extent of a light is ignored; geometry further than two unit-frame lengths (two to four region
+//! radii) towards a directional light does not shade.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::{GBuffer, Irradiance, Lights, ShadowMaps};
@@ -21,6 +21,18 @@ pub(crate) mod gpu {
         pub(crate) shadow_map_size: u32,
     }
 }
+
+/// Bindings of `shaders/pass/direct_light.wgsl`, in order.
+pub(crate) const SLOTS: [Slot; 8] = [
+    Slot::Uniform,
+    Slot::Uniform,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::Storage,
+    Slot::UintArray,
+    Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
+];
 
 /// The pass.
 #[derive(Debug)]
@@ -57,17 +69,7 @@ pub struct DirectLightInputs<'a> {
 impl DirectLight {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
-        let slots = [
-            Slot::Uniform,
-            Slot::Uniform,
-            Slot::Texture,
-            Slot::Texture,
-            Slot::Texture,
-            Slot::Storage,
-            Slot::UintArray,
-            Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
-        ];
-        let layout = device::layout(device, "lightfall::DirectLight", wgpu::ShaderStages::COMPUTE, &slots);
+        let layout = device::layout(device, "lightfall::DirectLight", wgpu::ShaderStages::COMPUTE, &SLOTS);
         let light = device::compute_pipeline(
             device,
             &ComputeSpec {

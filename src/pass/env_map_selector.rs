@@ -32,6 +32,9 @@ pub(crate) mod gpu {
     }
 }
 
+/// Bindings of `shaders/pass/env_map_selector.wgsl`, in order.
+pub(crate) const SLOTS: [Slot; 3] = [Slot::Uniform, Slot::UintArray, Slot::StorageMut];
+
 /// Texels along a face of a candidate's map (Yao et al. 2010, section 4).
 const CANDIDATE_SIZE: u32 = 32;
 
@@ -106,8 +109,7 @@ pub struct EnvMapSelectorInputs<'a> {
 impl EnvMapSelector {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
-        let slots = [Slot::Uniform, Slot::UintArray, Slot::StorageMut];
-        let layout = device::layout(device, "lightfall::EnvMapSelector", wgpu::ShaderStages::COMPUTE, &slots);
+        let layout = device::layout(device, "lightfall::EnvMapSelector", wgpu::ShaderStages::COMPUTE, &SLOTS);
         let inspect = device::compute_pipeline(
             device,
             &ComputeSpec {

@@ -30,6 +30,9 @@ pub(crate) mod gpu {
     }
 }
 
+/// Bindings of `shaders/pass/image_space_tracer/walk_photons.wgsl`, in order.
+pub(crate) const SLOTS: [Slot; 4] = [Slot::Uniform, Slot::UintArray, Slot::Storage, Slot::StorageMut];
+
 /// How a ray is searched for in the maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum TraceMethod {
@@ -106,12 +109,11 @@ pub struct ImageSpaceTracerInputs<'a> {
 impl ImageSpaceTracer {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
-        let slots = [Slot::Uniform, Slot::UintArray, Slot::Storage, Slot::StorageMut];
         let layout = device::layout(
             device,
             "lightfall::ImageSpaceTracer",
             wgpu::ShaderStages::COMPUTE,
-            &slots,
+            &SLOTS,
         );
         let walk = |method: TraceMethod| {
             device::compute_pipeline(

@@ -4,20 +4,20 @@
 //! borrowed for one frame; `record` writes commands into the host's encoder and neither submits nor waits. A pass knows
 //! the resources at its seams and no other pass.
 
-mod accumulator;
+pub(crate) mod accumulator;
 mod capture;
-mod composite;
-mod direct_light;
+pub(crate) mod composite;
+pub(crate) mod direct_light;
 mod env_map_capture;
-mod env_map_selector;
+pub(crate) mod env_map_selector;
 mod full_screen;
 mod g_buffer_capture;
-mod image_space_tracer;
-mod photon_emitter;
-mod photon_splatter;
+pub(crate) mod image_space_tracer;
+pub(crate) mod photon_emitter;
+pub(crate) mod photon_splatter;
 mod shadow_map_capture;
-mod tone_map;
-mod trace_statistics;
+pub(crate) mod tone_map;
+pub(crate) mod trace_statistics;
 
 pub use accumulator::{Accumulator, AccumulatorInputs, AccumulatorResources};
 pub use composite::{Composite, CompositeInputs, CompositeResources, CompositeSettings};

@@ -24,6 +24,9 @@ pub(crate) mod gpu {
     }
 }
 
+/// Bindings of `shaders/pass/photon_emitter.wgsl`, in order.
+pub(crate) const SLOTS: [Slot; 4] = [Slot::Uniform, Slot::Storage, Slot::UintArray, Slot::StorageMut];
+
 /// The pass.
 #[derive(Debug)]
 pub struct PhotonEmitter {
@@ -60,8 +63,7 @@ pub struct PhotonEmitterInputs<'a> {
 impl PhotonEmitter {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
-        let slots = [Slot::Uniform, Slot::Storage, Slot::UintArray, Slot::StorageMut];
-        let layout = device::layout(device, "lightfall::PhotonEmitter", wgpu::ShaderStages::COMPUTE, &slots);
+        let layout = device::layout(device, "lightfall::PhotonEmitter", wgpu::ShaderStages::COMPUTE, &SLOTS);
         let emit = device::compute_pipeline(
             device,
             &ComputeSpec {

@@ -38,7 +38,6 @@ pub(crate) mod gpu {
         pub(crate) row: u32,
         pub(crate) max_radius: f32,
         pub(crate) capacity: u32,
-        pub(crate) _pad: u32,
     }
 
     /// Twin of `Params` in `shaders/pass/photon_splatter/quads.wgsl`.
@@ -48,7 +47,6 @@ pub(crate) mod gpu {
         pub(crate) bandwidth: Bandwidth,
         pub(crate) first_slot: u32,
         pub(crate) max_radius: f32,
-        pub(crate) _pad: [u32; 2],
     }
 
     /// Twin of `Splat` in `tiled.wgsl`.
@@ -72,14 +70,40 @@ pub(crate) mod gpu {
     }
 }
 
+/// Bindings of `shaders/pass/photon_splatter/tiled.wgsl`, in order.
+pub(crate) const TILED_SLOTS: [Slot; 11] = [
+    Slot::Uniform,
+    Slot::Uniform,
+    Slot::Storage,
+    Slot::StorageMut,
+    Slot::StorageMut,
+    Slot::StorageMut,
+    Slot::StorageMut,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
+];
+
+/// Bindings of `shaders/pass/photon_splatter/quads.wgsl`, in order.
+pub(crate) const QUAD_SLOTS: [Slot; 6] = [
+    Slot::Uniform,
+    Slot::Uniform,
+    Slot::Storage,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::Texture,
+];
+
 /// Pixels along a tile's side. Twin of `TILE` in `tiled.wgsl`.
-const TILE: u32 = 16;
+pub(crate) const TILE: u32 = 16;
 
 /// Tiles along a side that one photon may touch. Twin of `TILES_A_SIDE`.
-const TILES_A_SIDE: u32 = 4;
+pub(crate) const TILES_A_SIDE: u32 = 4;
 
-/// Largest kernel radius, pixels, that `TILES_A_SIDE` tiles hold wherever it lies.
-const LARGEST_RADIUS: f32 = 24.0;
+/// Largest kernel radius, pixels, that `TILES_A_SIDE` tiles hold wherever it lies: with a pixel of slack to each side it
+/// spans 48 pixels, and so at most 48 + 16.
+const LARGEST_RADIUS: f32 = 23.0;
 
 /// How a photon's kernel is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -145,7 +169,7 @@ impl PhotonSplatterConfig {
 pub struct PhotonSplatterSettings {
     /// Kernel radius.
     pub bandwidth: Bandwidth,
-    /// Widest kernel radius in pixels, up to 24: bounds the cost of a photon near the eye.
+    /// Widest kernel radius in pixels, up to 23: bounds the cost of a photon near the eye.
     pub max_radius: f32,
 }
 
@@ -311,7 +335,6 @@ impl PhotonSplatter {
             max_radius: inputs.settings.max_radius.clamp(0.0, LARGEST_RADIUS),
             capacity: (working.list.size() / 4) as u32,
             bandwidth: bandwidth(inputs),
-            _pad: 0,
         };
         inputs
             .queue
@@ -362,7 +385,6 @@ impl PhotonSplatter {
             bandwidth: bandwidth(inputs),
             first_slot: inputs.photons.count(),
             max_radius: inputs.settings.max_radius,
-            _pad: [0; 2],
         };
         inputs
             .queue
@@ -492,20 +514,12 @@ fn bandwidth(inputs: &PhotonSplatterInputs<'_>) -> gpu::Bandwidth {
 }
 
 fn tiled_pipelines(device: &wgpu::Device, constants: &[(&str, f64)]) -> (wgpu::BindGroupLayout, Pipelines) {
-    let slots = [
-        Slot::Uniform,
-        Slot::Uniform,
-        Slot::Storage,
-        Slot::StorageMut,
-        Slot::StorageMut,
-        Slot::StorageMut,
-        Slot::StorageMut,
-        Slot::Texture,
-        Slot::Texture,
-        Slot::Texture,
-        Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
-    ];
-    let layout = device::layout(device, "lightfall::PhotonSplatter", wgpu::ShaderStages::COMPUTE, &slots);
+    let layout = device::layout(
+        device,
+        "lightfall::PhotonSplatter",
+        wgpu::ShaderStages::COMPUTE,
+        &TILED_SLOTS,
+    );
     let pipeline = |label, entry_point| {
         device::compute_pipeline(
             device,
@@ -532,16 +546,8 @@ fn quad_pipeline(
     constants: &[(&str, f64)],
     format: wgpu::TextureFormat,
 ) -> (wgpu::BindGroupLayout, Pipelines) {
-    let slots = [
-        Slot::Uniform,
-        Slot::Uniform,
-        Slot::Storage,
-        Slot::Texture,
-        Slot::Texture,
-        Slot::Texture,
-    ];
     let stages = wgpu::ShaderStages::VERTEX_FRAGMENT;
-    let layout = device::layout(device, "lightfall::PhotonSplatter", stages, &slots);
+    let layout = device::layout(device, "lightfall::PhotonSplatter", stages, &QUAD_SLOTS);
     let add = wgpu::BlendComponent {
         src_factor: wgpu::BlendFactor::One,
         dst_factor: wgpu::BlendFactor::One,

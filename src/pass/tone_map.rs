@@ -21,6 +21,9 @@ pub(crate) mod gpu {
     }
 }
 
+/// Bindings of `shaders/pass/tone_map.wgsl`, in order.
+pub(crate) const SLOTS: [Slot; 2] = [Slot::Uniform, Slot::Texture];
+
 /// How radiance above the display's range is treated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ToneCurve {
@@ -82,9 +85,8 @@ pub struct ToneMapInputs<'a> {
 impl ToneMap {
     /// The pass for targets of `format`.
     pub fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
-        let slots = [Slot::Uniform, Slot::Texture];
         Self {
-            pass: FullScreen::new(device, "lightfall::ToneMap", wgsl::TONE_MAP, &slots, &[format]),
+            pass: FullScreen::new(device, "lightfall::ToneMap", wgsl::TONE_MAP, &SLOTS, &[format]),
         }
     }
 

@@ -28,6 +28,9 @@ pub(crate) mod gpu {
     }
 }
 
+/// Bindings of `shaders/pass/trace_statistics.wgsl`, in order.
+pub(crate) const SLOTS: [Slot; 3] = [Slot::Uniform, Slot::Storage, Slot::StorageMut];
+
 /// What became of the flux of one hop; unit frame, RGB.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct HopStatistics {
@@ -75,12 +78,11 @@ pub struct TraceStatisticsInputs<'a> {
 impl TraceStatistics {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
-        let slots = [Slot::Uniform, Slot::Storage, Slot::StorageMut];
         let layout = device::layout(
             device,
             "lightfall::TraceStatistics",
             wgpu::ShaderStages::COMPUTE,
-            &slots,
+            &SLOTS,
         );
         let sum = device::compute_pipeline(
             device,

@@ -135,6 +135,7 @@ impl GBuffer {
         let full = extent(&views.depth);
         expect("G-buffer normal", "size", extent(&views.normal), &[full])?;
         expect("G-buffer base colour", "size", extent(&views.base_color), &[full])?;
+        expect("G-buffer emission", "size", extent(&views.emission), &[full])?;
         let [x, y, width, height] = views.rectangle.unwrap_or([0, 0, full[0], full[1]]);
         let fits =
             |start: u32, length: u32, limit: u32| length > 0 && start.checked_add(length).is_some_and(|e| e <= limit);

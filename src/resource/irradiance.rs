@@ -3,7 +3,7 @@
 use super::expect_view;
 use crate::{Error, gpu};
 
-/// Irradiance, W/m² in the unit frame, RGB; alpha is 1 where a surface is seen. `rgba32float`, or a coarser format where
+/// Irradiance, W/m² in the unit frame, RGB; alpha is unused. `rgba32float`, or a coarser format where
 /// a pass says so.
 #[derive(Debug)]
 pub struct Irradiance {

@@ -16,6 +16,11 @@ const EVEN_SHARE: f64 = 0.25;
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
+    /// Kinds of [`LightRecord`]. Twins of `LIGHT_POINT`, `LIGHT_SPOT`, `LIGHT_DIRECTIONAL`.
+    pub(crate) const POINT: u32 = 0;
+    pub(crate) const SPOT: u32 = 1;
+    pub(crate) const DIRECTIONAL: u32 = 2;
+
     /// Twin of `Light` in `shaders/common/light.wgsl`.
     #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
     #[repr(C)]
@@ -146,7 +151,7 @@ fn record(frame: &UnitFrame, light: &Light, first_layer: u32, first_photon: u32,
     let photon_flux = light.flux(region_radius) / f64::from(count.max(1));
     let shape = ShadowMaps::light_shape(frame, light);
     let axes = axes_along(shape.direction);
-    let (mut inner, mut outer, mut kind) = (2.0, 2.0, 0);
+    let (mut inner, mut outer, mut kind) = (2.0, 2.0, gpu::POINT);
     let (mut position, mut intensity) = (Vec3::ZERO, frame.intensity(light.strength()));
     let mut density = 1.0 / light.effective_solid_angle().max(f64::MIN_POSITIVE);
     match light.kind {
@@ -157,13 +162,13 @@ fn record(frame: &UnitFrame, light: &Light, first_layer: u32, first_photon: u32,
             outer_angle,
             ..
         } => {
-            kind = 1;
+            kind = gpu::SPOT;
             position = frame.point(p);
             inner = crate::scene::one_minus_cos(inner_angle);
             outer = crate::scene::one_minus_cos(outer_angle);
         }
         LightKind::Directional { .. } => {
-            kind = 2;
+            kind = gpu::DIRECTIONAL;
             intensity = frame.radiance(light.strength());
             let radius = f64::from(frame.radius());
             density = 1.0 / (std::f64::consts::PI * radius * radius);

@@ -2,7 +2,7 @@
 //! that the host deforms on the GPU are drawn in every view.
 
 use super::{CaptureMask, CapturePurpose, CaptureTargets, CaptureView, Geometry, PrepareContext};
-use crate::gpu as device;
+use crate::gpu::{self as device, Slot};
 use crate::scene::{Instance, Material, Mesh, Scene, Texture};
 use crate::{Error, wgsl};
 use glam::{DAffine3, Mat3, Mat4, Vec3, Vec4};
@@ -48,6 +48,20 @@ pub(crate) mod gpu {
         pub(crate) tex_coord: [f32; 2],
     }
 }
+
+/// Bindings of group 0 of `shaders/resource/mesh_geometry.wgsl`, in order.
+pub(crate) const SCENE_SLOTS: [Slot; 3] = [
+    Slot::DynamicUniform(size_of::<gpu::MeshView>() as u64),
+    Slot::Storage,
+    Slot::Storage,
+];
+
+/// Bindings of group 1, in order.
+pub(crate) const MATERIAL_SLOTS: [Slot; 3] = [Slot::FilteredTexture, Slot::FilteredTexture, Slot::Sampler];
+
+/// Where the vertex stage finds the members of a vertex.
+pub(crate) const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 3] =
+    wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x2];
 
 /// A mesh on the GPU.
 #[derive(Debug)]
@@ -129,16 +143,9 @@ impl MeshGeometry {
             bytes += buffers.vertices.size() + buffers.indices.size();
             meshes.push(buffers);
         }
-        use device::Slot as S;
         let stages = wgpu::ShaderStages::VERTEX_FRAGMENT;
-        let scene_slots = [
-            S::DynamicUniform(size_of::<gpu::MeshView>() as u64),
-            S::Storage,
-            S::Storage,
-        ];
-        let scene_layout = device::layout(device, "lightfall::MeshGeometry::scene", stages, &scene_slots);
-        let material_slots = [S::FilteredTexture, S::FilteredTexture, S::Sampler];
-        let material_layout = device::layout(device, "lightfall::MeshGeometry::material", stages, &material_slots);
+        let scene_layout = device::layout(device, "lightfall::MeshGeometry::scene", stages, &SCENE_SLOTS);
+        let material_layout = device::layout(device, "lightfall::MeshGeometry::material", stages, &MATERIAL_SLOTS);
         let layouts = [&scene_layout, &material_layout];
         let (material_groups, texture_bytes) = material_groups(device, queue, scene, &material_layout)?;
         Ok(Self {
@@ -417,7 +424,7 @@ fn pipeline(
             buffers: &[Some(wgpu::VertexBufferLayout {
                 array_stride: MeshGeometry::VERTEX_BYTES,
                 step_mode: wgpu::VertexStepMode::Vertex,
-                attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x2],
+                attributes: &VERTEX_ATTRIBUTES,
             })],
             topology: wgpu::PrimitiveTopology::TriangleList,
             targets: &colors,

@@ -5,15 +5,15 @@
 
 pub mod cube_face;
 mod env_maps;
-mod g_buffer;
+pub(crate) mod g_buffer;
 mod geometry;
 mod irradiance;
-mod lights;
-mod mesh_geometry;
+pub(crate) mod lights;
+pub(crate) mod mesh_geometry;
 mod photons;
 mod radiance;
 mod shadow_maps;
-mod view;
+pub(crate) mod view;
 
 pub use env_maps::EnvMaps;
 pub use g_buffer::{GBuffer, GBufferViews, NormalEncoding};

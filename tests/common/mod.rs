@@ -5,8 +5,8 @@
 mod examples;
 
 pub(crate) use examples::adapter::{Gpu, Wishes};
-pub(crate) use examples::offline::{self, Component, Offline};
 pub(crate) use examples::exr_file;
+pub(crate) use examples::offline::{self, Component, Offline};
 
 /// A device, or `None` with a printed reason where the machine has no usable adapter; a failure where
 /// `LIGHTFALL_REQUIRE_GPU=1` says that there must be one.

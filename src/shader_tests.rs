@@ -1,0 +1,566 @@
+//! What Rust and WGSL must agree on, checked without a GPU: shaders are valid, PODs lie in memory as their twins do,
+//! bindings match bind group layouts, and nothing needs more than the default limits.
+
+use crate::gpu::Slot;
+use crate::pass::{
+    accumulator, composite, direct_light, env_map_selector, image_space_tracer, photon_emitter, photon_splatter,
+    tone_map, trace_statistics,
+};
+use crate::resource::{Photon, PhotonState, g_buffer, lights, mesh_geometry, view};
+use crate::wgsl;
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use naga::{AddressSpace, Handle, ImageClass, ImageDimension, Literal, ScalarKind, StorageAccess, Type, TypeInner};
+use std::collections::BTreeMap;
+use std::mem::offset_of;
+
+/// What a shader may use. Core WebGPU is three bits more: cube arrays (`CUBE_ARRAY_TEXTURES`), per-sample shading
+/// (`MULTISAMPLED_SHADING`) and f16 packing (`SHADER_FLOAT16_IN_FLOAT32`). wgpu takes them from downlevel flags, so an
+/// adapter may lack them, and no shader of this crate wants them; every other bit stands for an optional feature.
+const CAPABILITIES: Capabilities = Capabilities::empty();
+
+/// A parsed and validated module.
+struct Shader {
+    module: naga::Module,
+    info: ModuleInfo,
+}
+
+impl Shader {
+    fn new(name: &str, source: &str) -> Self {
+        let module = naga::front::wgsl::parse_str(source)
+            .unwrap_or_else(|e| panic!("{name} does not parse: {}", e.emit_to_string(source)));
+        let info = Validator::new(ValidationFlags::all(), CAPABILITIES)
+            .validate(&module)
+            .unwrap_or_else(|e| panic!("{name} is not valid: {}", e.emit_to_string(source)));
+        Self { module, info }
+    }
+
+    fn size(&self, ty: Handle<Type>) -> u32 {
+        self.module.types[ty].inner.size(self.module.to_ctx())
+    }
+
+    /// What the numbers of a type are; `None` for a struct. Atomics are plain numbers to Rust.
+    fn scalar(&self, ty: Handle<Type>) -> Option<ScalarKind> {
+        match self.module.types[ty].inner {
+            TypeInner::Atomic(scalar) => Some(scalar.kind),
+            ref inner => inner.scalar_kind(),
+        }
+    }
+
+    /// The struct that a buffer variable holds: its type, or the element of its array.
+    fn buffer_struct(&self, ty: Handle<Type>) -> Option<&str> {
+        match self.module.types[ty].inner {
+            TypeInner::Struct { .. } => self.module.types[ty].name.as_deref(),
+            TypeInner::Array { base, .. } => self.buffer_struct(base),
+            _ => None,
+        }
+    }
+
+    fn struct_named(&self, name: &str) -> (Handle<Type>, &[naga::StructMember]) {
+        self.module
+            .types
+            .iter()
+            .find_map(|(handle, ty)| match &ty.inner {
+                TypeInner::Struct { members, .. } if ty.name.as_deref() == Some(name) => Some((handle, &members[..])),
+                _ => None,
+            })
+            .unwrap_or_else(|| panic!("no struct {name}"))
+    }
+
+    fn members(&self, name: &str) -> Vec<Member> {
+        let member = |m: &naga::StructMember| Member {
+            name: m.name.clone().unwrap_or_default(),
+            offset: m.offset as usize,
+            size: self.size(m.ty) as usize,
+            scalar: self.scalar(m.ty),
+        };
+        self.struct_named(name).1.iter().map(member).collect()
+    }
+
+    fn constant(&self, name: &str) -> Literal {
+        let (_, constant) = self
+            .module
+            .constants
+            .iter()
+            .find(|(_, c)| c.name.as_deref() == Some(name))
+            .unwrap_or_else(|| panic!("no constant {name}"));
+        match self.module.global_expressions[constant.init] {
+            naga::Expression::Literal(value) => value,
+            ref other => panic!("{name} is {other:?}"),
+        }
+    }
+
+    /// Group and binding of every resource, and what it is, as WGSL writes it.
+    fn bindings(&self) -> BTreeMap<[u32; 2], String> {
+        let mut bindings = BTreeMap::new();
+        for (_, variable) in self.module.global_variables.iter() {
+            if let Some(at) = variable.binding {
+                let kind = kind_of_variable(variable.space, &self.module.types[variable.ty].inner);
+                let taken = bindings.insert([at.group, at.binding], kind);
+                assert_eq!(taken, None, "two variables at {at:?}");
+            }
+        }
+        bindings
+    }
+}
+
+/// Every composed module, by name.
+fn shaders() -> impl Iterator<Item = (&'static str, Shader)> {
+    wgsl::MODULES
+        .iter()
+        .map(|&(name, source)| (name, Shader::new(name, source)))
+}
+
+#[test]
+fn every_module_is_valid_core_wgsl() {
+    for (name, shader) in shaders() {
+        assert!(!shader.module.entry_points.is_empty(), "{name} has no entry point");
+    }
+}
+
+#[test]
+fn the_capture_functions_are_valid_in_a_host_shader_and_bind_nothing() {
+    let host = "
+        @fragment
+        fn fragment(
+            @location(0) position: vec3f, @location(1) eye: vec4f, @builtin(front_facing) front_facing: bool,
+        ) -> @location(0) vec4u {
+            let normal = surface_capture_normal(position);
+            return surface_texel_pack(surface_texel_at(position, normal, vec3f(0.5), eye, front_facing));
+        }";
+    let shader = Shader::new("CAPTURE", &(wgsl::CAPTURE.to_owned() + host));
+    assert!(shader.module.global_variables.is_empty());
+}
+
+#[test]
+fn the_common_functions_are_valid_by_themselves() {
+    let host = "@compute @workgroup_size(1) fn main() {}";
+    let shader = Shader::new("COMMON", &(wgsl::COMMON.to_owned() + host));
+    assert!(shader.module.global_variables.is_empty());
+}
+
+/// One member of a struct, on either side.
+#[derive(Debug, Clone, PartialEq)]
+struct Member {
+    name: String,
+    offset: usize,
+    size: usize,
+    /// What its numbers are; `None` for a struct.
+    scalar: Option<ScalarKind>,
+}
+
+/// What PODs are made of, and what WGSL calls its numbers.
+trait Field {
+    const SCALAR: Option<ScalarKind>;
+}
+
+impl Field for f32 {
+    const SCALAR: Option<ScalarKind> = Some(ScalarKind::Float);
+}
+
+impl Field for u32 {
+    const SCALAR: Option<ScalarKind> = Some(ScalarKind::Uint);
+}
+
+impl<T: Field, const N: usize> Field for [T; N] {
+    const SCALAR: Option<ScalarKind> = T::SCALAR;
+}
+
+impl Field for photon_splatter::gpu::Bandwidth {
+    const SCALAR: Option<ScalarKind> = None;
+}
+
+/// A member of `P`; the accessor is there for its type.
+fn member<P, T: Field>(name: &str, offset: usize, _accessor: fn(&P) -> &T) -> Member {
+    Member {
+        name: name.to_owned(),
+        offset,
+        size: size_of::<T>(),
+        scalar: T::SCALAR,
+    }
+}
+
+/// A POD and the WGSL struct it must equal.
+struct Twin {
+    source: &'static str,
+    name: &'static str,
+    size: usize,
+    /// In memory order, without padding.
+    members: Vec<Member>,
+}
+
+/// Lists a POD's members; leaving one out does not compile. Those called `_pad…` are padding.
+macro_rules! twin {
+    ($source:expr, $name:literal, $pod:path { $($field:ident),+ $(,)? }) => {{
+        let _every_member_is_listed = |$pod { $($field: _),+ }: $pod| {};
+        let mut members = vec![
+            $(member(stringify!($field), offset_of!($pod, $field), |pod: &$pod| &pod.$field)),+
+        ];
+        members.retain(|m| !m.name.starts_with("_pad"));
+        members.sort_by_key(|m| m.offset);
+        Twin { source: $source, name: $name, size: size_of::<$pod>(), members }
+    }};
+}
+
+#[rustfmt::skip] // One POD a paragraph.
+fn twins() -> Vec<Twin> {
+    vec![
+        twin!(wgsl::COMPOSITE, "View", g_buffer::gpu::ViewUniform {
+            view_projection, inverse_view_projection, eye, size, origin, normal_encoding, _pad,
+        }),
+        twin!(wgsl::DIRECT_LIGHT, "Light", lights::gpu::LightRecord {
+            position, kind, direction, inner, intensity, outer, right, first_layer, up, layer_count, photon_flux,
+            half_extent, first_photon, photon_count, density, disc_radius,
+        }),
+        twin!(wgsl::PHOTON_EMITTER, "Photon", Photon {
+            position, state, flux, density, normal, direction, reflectance, light,
+        }),
+        twin!(wgsl::MESH_GEOMETRY, "View", mesh_geometry::gpu::MeshView { view_projection, eye }),
+        twin!(wgsl::MESH_GEOMETRY, "Instance", mesh_geometry::gpu::MeshInstance {
+            transform, normal_transform, material, mirrored, _pad,
+        }),
+        twin!(wgsl::MESH_GEOMETRY, "Material", mesh_geometry::gpu::MeshMaterial {
+            base_color, alpha_cutoff, emission, _pad,
+        }),
+        twin!(wgsl::PHOTON_EMITTER, "Params", photon_emitter::gpu::Params {
+            photon_count, light_count, sample_offset, shadow_map_size, row,
+        }),
+        twin!(wgsl::IMAGE_SPACE_TRACER, "Params", image_space_tracer::gpu::Params {
+            photon_count, bounces, roulette_from, sample_offset, map_count, map_size, iterations, epsilon, row,
+        }),
+        twin!(wgsl::PHOTON_SPLATTER_TILED, "Bandwidth", photon_splatter::gpu::Bandwidth {
+            scale, uniform_density, lowest, highest,
+        }),
+        twin!(wgsl::PHOTON_SPLATTER_TILED, "Params", photon_splatter::gpu::TiledParams {
+            bandwidth, first_slot, slot_count, tile_columns, tile_rows, row, max_radius, capacity,
+        }),
+        twin!(wgsl::PHOTON_SPLATTER_TILED, "Splat", photon_splatter::gpu::Splat { position, radius, flux, normal }),
+        twin!(wgsl::PHOTON_SPLATTER_TILED, "Tile", photon_splatter::gpu::Tile { count, first, filled, brightest }),
+        twin!(wgsl::PHOTON_SPLATTER_QUADS, "Params", photon_splatter::gpu::QuadParams {
+            bandwidth, first_slot, max_radius,
+        }),
+        twin!(wgsl::DIRECT_LIGHT, "Params", direct_light::gpu::Params { light_count, shadow_map_size }),
+        twin!(wgsl::COMPOSITE, "Params", composite::gpu::Params {
+            output_scale, direct_weight, indirect_weight, emission_weight,
+        }),
+        twin!(wgsl::ACCUMULATOR, "Params", accumulator::gpu::Params { history_weight, mean_weight }),
+        twin!(wgsl::TONE_MAP, "Params", tone_map::gpu::Params { exposure, curve, inverse_gamma }),
+        twin!(wgsl::ENV_MAP_SELECTOR, "Params", env_map_selector::gpu::Params { map_size }),
+        twin!(wgsl::ENV_MAP_SELECTOR, "Sight", env_map_selector::gpu::SightRecord {
+            texels, surfaces, back_faces, nearest,
+        }),
+        twin!(wgsl::TRACE_STATISTICS, "Params", trace_statistics::gpu::Params { photon_count }),
+        twin!(wgsl::TRACE_STATISTICS, "Sums", trace_statistics::gpu::Sums { stored, absorbed, escaped, lost }),
+    ]
+}
+
+/// Members that the other side has not, or has elsewhere.
+fn only_in(members: &[Member], others: &[Member]) -> Vec<Member> {
+    members.iter().filter(|m| !others.contains(m)).cloned().collect()
+}
+
+#[test]
+fn every_pod_lies_in_memory_as_its_wgsl_twin() {
+    for twin in twins() {
+        let what = format!("{} of\n{}", twin.name, twin.source.lines().next().unwrap_or_default());
+        let shader = Shader::new(twin.name, twin.source);
+        let wgsl = shader.members(twin.name);
+        assert_eq!(only_in(&twin.members, &wgsl), only_in(&wgsl, &twin.members), "{what}");
+        let (ty, _) = shader.struct_named(twin.name);
+        let span = shader.size(ty) as usize;
+        // A binding must hold at least the WGSL struct; a uniform may be padded to the 16 bytes that the uniform address
+        // space aligns structs to. An array in a storage buffer leaves no such choice: size is stride.
+        let is_uniform = |v: &naga::GlobalVariable| v.ty == ty && v.space == AddressSpace::Uniform;
+        let longest = if shader.module.global_variables.iter().any(|(_, v)| is_uniform(v)) {
+            span.next_multiple_of(16)
+        } else {
+            span
+        };
+        assert!(
+            (span..=longest).contains(&twin.size),
+            "{what}\n{} bytes, not {span}",
+            twin.size
+        );
+    }
+}
+
+#[test]
+fn every_struct_that_a_shader_binds_has_a_twin() {
+    let twins = twins();
+    for (name, shader) in shaders() {
+        let bound = shader
+            .module
+            .global_variables
+            .iter()
+            .filter(|(_, v)| v.binding.is_some());
+        for (_, variable) in bound {
+            if let Some(bound) = shader.buffer_struct(variable.ty) {
+                let members = shader.members(bound);
+                let has_twin = twins.iter().any(|t| t.name == bound && t.members == members);
+                assert!(has_twin, "{bound} of {name} is not among the twins");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_vertex_is_laid_out_as_the_vertex_stage_reads_it() {
+    use mesh_geometry::gpu::MeshVertex;
+    let shader = Shader::new("MeshGeometry", wgsl::MESH_GEOMETRY);
+    let stage = &shader.module.entry_points[0];
+    assert_eq!(stage.name, "vertex");
+    let read = stage.function.arguments.iter().filter_map(|argument| {
+        let Some(naga::Binding::Location { location, .. }) = argument.binding else {
+            return None;
+        };
+        let found = mesh_geometry::VERTEX_ATTRIBUTES
+            .iter()
+            .find(|a| a.shader_location == location);
+        let attribute = found.unwrap_or_else(|| panic!("no attribute at location {location}"));
+        Some(Member {
+            name: argument.name.clone().unwrap_or_default(),
+            offset: attribute.offset as usize,
+            size: shader.size(argument.ty) as usize,
+            scalar: shader.scalar(argument.ty),
+        })
+    });
+    let pod = twin!(
+        wgsl::MESH_GEOMETRY,
+        "",
+        MeshVertex {
+            position,
+            normal,
+            tex_coord
+        }
+    );
+    assert_eq!(pod.members, read.collect::<Vec<_>>());
+    for (attribute, member) in mesh_geometry::VERTEX_ATTRIBUTES.iter().zip(&pod.members) {
+        assert_eq!(attribute.format.size() as usize, member.size, "{}", member.name);
+    }
+    assert_eq!(pod.size, pod.members.iter().map(|m| m.size).sum::<usize>(), "no gaps");
+}
+
+/// The bind group layouts of a module, by group.
+fn layouts(module: &str) -> Vec<&'static [Slot]> {
+    match module {
+        "MeshGeometry" => vec![&mesh_geometry::SCENE_SLOTS, &mesh_geometry::MATERIAL_SLOTS],
+        "PhotonEmitter" => vec![&photon_emitter::SLOTS],
+        "ImageSpaceTracer" => vec![&image_space_tracer::SLOTS],
+        "PhotonSplatter tiled" => vec![&photon_splatter::TILED_SLOTS],
+        "PhotonSplatter quads" => vec![&photon_splatter::QUAD_SLOTS],
+        "DirectLight" => vec![&direct_light::SLOTS],
+        "Composite" => vec![&composite::SLOTS],
+        "Accumulator" => vec![&accumulator::SLOTS],
+        "ToneMap" => vec![&tone_map::SLOTS],
+        "EnvMapSelector" => vec![&env_map_selector::SLOTS],
+        "TraceStatistics" => vec![&trace_statistics::SLOTS],
+        _ => panic!("which layouts has {module}?"),
+    }
+}
+
+/// What a slot takes, as WGSL writes it.
+fn kind_of_slot(slot: Slot) -> String {
+    match slot {
+        Slot::Uniform | Slot::DynamicUniform(_) => "var<uniform>".into(),
+        Slot::Storage => "var<storage, read>".into(),
+        Slot::StorageMut => "var<storage, read_write>".into(),
+        Slot::Texture | Slot::FilteredTexture => "texture_2d<f32>".into(),
+        Slot::UintArray => "texture_2d_array<u32>".into(),
+        Slot::StorageTexture(format) => format!("texture_storage_2d<{format:?}, write>"),
+        Slot::Sampler => "sampler".into(),
+    }
+}
+
+/// What a variable is, as WGSL writes it; what no slot takes is written as naga does.
+fn kind_of_variable(space: AddressSpace, ty: &TypeInner) -> String {
+    let read_write = StorageAccess::LOAD | StorageAccess::STORE;
+    match (space, ty) {
+        (AddressSpace::Uniform, _) => "var<uniform>".into(),
+        (AddressSpace::Storage { access }, _) if access == StorageAccess::LOAD => "var<storage, read>".into(),
+        (AddressSpace::Storage { access }, _) if access == read_write => "var<storage, read_write>".into(),
+        (AddressSpace::Handle, TypeInner::Sampler { comparison: false }) => "sampler".into(),
+        (
+            AddressSpace::Handle,
+            &TypeInner::Image {
+                dim: ImageDimension::D2,
+                arrayed,
+                class,
+            },
+        ) => match (arrayed, class) {
+            (
+                false,
+                ImageClass::Sampled {
+                    kind: ScalarKind::Float,
+                    multi: false,
+                },
+            ) => "texture_2d<f32>".into(),
+            (
+                true,
+                ImageClass::Sampled {
+                    kind: ScalarKind::Uint,
+                    multi: false,
+                },
+            ) => "texture_2d_array<u32>".into(),
+            (
+                false,
+                ImageClass::Storage {
+                    format,
+                    access: StorageAccess::STORE,
+                },
+            ) => {
+                format!("texture_storage_2d<{format:?}, write>")
+            }
+            other => format!("{other:?}"),
+        },
+        other => format!("{other:?}"),
+    }
+}
+
+#[test]
+fn every_binding_matches_its_bind_group_layout() {
+    for (name, shader) in shaders() {
+        let mut slots = BTreeMap::new();
+        for (group, layout) in (0..).zip(layouts(name)) {
+            slots.extend(
+                (0..)
+                    .zip(layout)
+                    .map(|(binding, &slot)| ([group, binding], kind_of_slot(slot))),
+            );
+        }
+        assert_eq!(slots, shader.bindings(), "{name}: layout, shader");
+    }
+}
+
+#[test]
+fn every_layout_stays_within_default_limits() {
+    let limits = wgpu::Limits::default();
+    for (name, _) in wgsl::MODULES {
+        let groups = layouts(name);
+        assert!(groups.len() <= limits.max_bind_groups as usize, "{name}: bind groups");
+        // Layouts, not what an entry point uses, are what a device counts, for every stage that may see them.
+        let at_most = |limit: u32, what: &str, is_counted: fn(&Slot) -> bool| {
+            let count = groups.iter().copied().flatten().filter(|slot| is_counted(slot)).count();
+            assert!(count <= limit as usize, "{name}: {count} {what}, not {limit}");
+        };
+        at_most(limits.max_uniform_buffers_per_shader_stage, "uniform buffers", |slot| {
+            matches!(slot, Slot::Uniform | Slot::DynamicUniform(_))
+        });
+        at_most(limits.max_storage_buffers_per_shader_stage, "storage buffers", |slot| {
+            matches!(slot, Slot::Storage | Slot::StorageMut)
+        });
+        at_most(
+            limits.max_sampled_textures_per_shader_stage,
+            "sampled textures",
+            |slot| matches!(slot, Slot::Texture | Slot::FilteredTexture | Slot::UintArray),
+        );
+        at_most(
+            limits.max_storage_textures_per_shader_stage,
+            "storage textures",
+            |slot| matches!(slot, Slot::StorageTexture(_)),
+        );
+        at_most(limits.max_samplers_per_shader_stage, "samplers", |slot| {
+            matches!(slot, Slot::Sampler)
+        });
+    }
+}
+
+#[test]
+fn every_workgroup_stays_within_default_limits() {
+    let limits = wgpu::Limits::default();
+    for (name, shader) in shaders() {
+        for (index, entry) in shader.module.entry_points.iter().enumerate() {
+            let what = format!("{name}: {}", entry.name);
+            // Vertex and fragment stages say 0.
+            let invocations: u32 = entry.workgroup_size.iter().product();
+            assert!(
+                invocations <= limits.max_compute_invocations_per_workgroup,
+                "{what}: {invocations}"
+            );
+            let longest = [
+                limits.max_compute_workgroup_size_x,
+                limits.max_compute_workgroup_size_y,
+                limits.max_compute_workgroup_size_z,
+            ];
+            assert!(
+                entry
+                    .workgroup_size
+                    .iter()
+                    .zip(longest)
+                    .all(|(&side, limit)| side <= limit),
+                "{what}"
+            );
+            let uses = shader.info.get_entry_point(index);
+            let bytes: u32 = shader
+                .module
+                .global_variables
+                .iter()
+                .filter(|(handle, v)| v.space == AddressSpace::WorkGroup && !uses[*handle].is_empty())
+                // WebGPU counts every variable in steps of 16 bytes.
+                .map(|(_, v)| shader.size(v.ty).next_multiple_of(16))
+                .sum();
+            assert!(
+                bytes <= limits.max_compute_workgroup_storage_size,
+                "{what}: {bytes} bytes"
+            );
+        }
+    }
+}
+
+#[test]
+fn photon_states_are_the_same_on_both_sides() {
+    let shader = Shader::new("PhotonEmitter", wgsl::PHOTON_EMITTER);
+    let photon = |state| Photon {
+        state,
+        ..bytemuck::Zeroable::zeroed()
+    };
+    for (name, state) in [
+        ("PHOTON_EMPTY", PhotonState::Empty),
+        ("PHOTON_STORED", PhotonState::Stored),
+        ("PHOTON_ESCAPED", PhotonState::Escaped),
+        ("PHOTON_LOST", PhotonState::Lost),
+    ] {
+        assert_eq!(shader.constant(name), Literal::U32(state as u32), "{name}");
+        let first_hit = photon(state as u32 | Photon::FIRST_HIT);
+        assert_eq!((first_hit.state(), first_hit.is_first_hit()), (state, true), "{name}");
+    }
+    assert_eq!(shader.constant("PHOTON_FIRST_HIT"), Literal::U32(Photon::FIRST_HIT));
+    let Literal::U32(mask) = shader.constant("PHOTON_STATE_MASK") else {
+        panic!("PHOTON_STATE_MASK is not a u32");
+    };
+    assert_eq!(photon(!mask).state(), PhotonState::Empty);
+    assert_eq!(photon(mask).state() as u32, mask);
+}
+
+#[test]
+fn light_kinds_are_the_same_on_both_sides() {
+    let shader = Shader::new("DirectLight", wgsl::DIRECT_LIGHT);
+    for (name, kind) in [
+        ("LIGHT_POINT", lights::gpu::POINT),
+        ("LIGHT_SPOT", lights::gpu::SPOT),
+        ("LIGHT_DIRECTIONAL", lights::gpu::DIRECTIONAL),
+    ] {
+        assert_eq!(shader.constant(name), Literal::U32(kind), "{name}");
+    }
+}
+
+#[test]
+fn trace_methods_are_the_same_on_both_sides() {
+    use image_space_tracer::TraceMethod;
+    let shader = Shader::new("ImageSpaceTracer", wgsl::IMAGE_SPACE_TRACER);
+    assert_eq!(shader.constant("METHOD_PAPER"), Literal::U32(TraceMethod::Paper as u32));
+    assert_eq!(shader.constant("METHOD_PLANE"), Literal::U32(TraceMethod::Plane as u32));
+}
+
+#[test]
+fn tiles_are_the_same_on_both_sides() {
+    use photon_splatter::{TILE, TILES_A_SIDE};
+    let shader = Shader::new("PhotonSplatter tiled", wgsl::PHOTON_SPLATTER_TILED);
+    assert_eq!(shader.constant("TILE"), Literal::U32(TILE));
+    assert_eq!(shader.constant("TILES_A_SIDE"), Literal::I32(TILES_A_SIDE as i32));
+}
+
+#[test]
+fn parallel_views_start_where_the_shaders_think() {
+    let shader = Shader::new("MeshGeometry", wgsl::MESH_GEOMETRY);
+    let start = shader.constant("SURFACE_TEXEL_PARALLEL_START");
+    assert_eq!(start, Literal::F32(view::PARALLEL_REACH));
+}
