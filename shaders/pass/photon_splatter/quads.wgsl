@@ -60,5 +60,9 @@ fn fragment(quad: Quad) -> @location(0) vec4f {
     let p = splat_position(view, vec2i(pixel));
     let shading = g_buffer_normal(view, textureLoad(normal_texture, at, 0));
     let n = splat_receiver_normal(view, vec2i(pixel), p, shading);
-    return vec4f(quad.flux * splat_weight(p, n, quad.position, quad.normal, quad.radius), 0.0);
+    let splat = splat_prepare(quad.position, quad.normal, quad.radius, quad.flux);
+    let d = p - splat.position;
+    let q = dot(d, d) * splat.inverse_radius_squared;
+    let weight = splat_weight(vec4f(q), vec4f(abs(dot(d, splat.normal))), vec4f(dot(n, splat.normal)), splat.slab);
+    return vec4f(splat.strength * weight.x, 0.0);
 }

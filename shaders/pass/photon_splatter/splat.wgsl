@@ -20,10 +20,10 @@ struct Bandwidth {
     highest: f32,
 }
 
-// K at squared relative distance q in [0, 1].
-fn splat_kernel(q: f32) -> f32 {
+// K at squared relative distances q in [0, 1], four receivers at a time.
+fn splat_kernel(q: vec4f) -> vec4f {
     switch kernel {
-        case 0u: { return SPLAT_INVERSE_PI; }
+        case 0u: { return vec4f(SPLAT_INVERSE_PI); }
         case 1u: { return 3.0 * SPLAT_INVERSE_PI * (1.0 - sqrt(q)); }
         default: { return 2.0 * SPLAT_INVERSE_PI * (1.0 - q); }
     }
@@ -37,15 +37,27 @@ fn splat_bandwidth(b: Bandwidth, density: f32) -> f32 {
     return b.scale * inverseSqrt(clamp(density / b.uniform_density, b.lowest, b.highest));
 }
 
-// Weight, 1/area, of a photon at x_p, normal n_p, radius h, for a receiver at x with geometric normal n.
-fn splat_weight(x: vec3f, n: vec3f, x_p: vec3f, n_p: vec3f, h: f32) -> f32 {
-    let d = x - x_p;
-    let q = dot(d, d) / (h * h);
-    let in_slab = abs(dot(d, n_p)) <= SPLAT_SLAB * h + SPLAT_SLAB_FLOOR;
-    if q >= 1.0 || !in_slab || dot(n, n_p) < SPLAT_NORMAL_AGREEMENT {
-        return 0.0;
-    }
-    return splat_kernel(q) / (h * h);
+// What a receiver needs of a photon's kernel, with all that does not depend on the receiver worked out.
+struct Kernel {
+    position: vec3f,
+    inverse_radius_squared: f32,
+    normal: vec3f,
+    // Half thickness of the slab that receives it
+    slab: f32,
+    // Flux over squared radius, in units of the caller's choice
+    strength: vec3f,
+}
+
+fn splat_prepare(position: vec3f, normal: vec3f, radius: f32, flux: vec3f) -> Kernel {
+    let inverse = 1.0 / (radius * radius);
+    return Kernel(position, inverse, normal, SPLAT_SLAB * radius + SPLAT_SLAB_FLOOR, flux * inverse);
+}
+
+// K at receivers at squared relative distance q, this far off the photon's plane, whose normals agree with its by this
+// cosine; zero outside the disc, off the slab, or on a surface that turns away.
+fn splat_weight(q: vec4f, off_plane: vec4f, agreement: vec4f, slab: f32) -> vec4f {
+    let admitted = (q < vec4f(1.0)) & (off_plane <= vec4f(slab)) & (agreement >= vec4f(SPLAT_NORMAL_AGREEMENT));
+    return select(vec4f(0.0), splat_kernel(min(q, vec4f(1.0))), admitted);
 }
 
 fn splat_position(view: View, pixel: vec2i) -> vec3f {

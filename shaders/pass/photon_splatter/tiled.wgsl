@@ -139,7 +139,7 @@ fn project_photons(@builtin(global_invocation_id) id: vec3u) {
     let tile_range = tiles_of(range);
     splats[index] = Splat(photon.position, h, photon.flux, photon.normal);
     rectangles[index] = vec2u(pack_pixel(range.xy), pack_pixel(range.zw));
-    let peak = max(photon.flux.x, max(photon.flux.y, photon.flux.z)) * splat_kernel(0.0) / (h * h);
+    let peak = max(photon.flux.x, max(photon.flux.y, photon.flux.z)) * splat_kernel(vec4f(0.0)).x / (h * h);
     for (var y = tile_range.y; y <= tile_range.w; y++) {
         for (var x = tile_range.x; x <= tile_range.z; x++) {
             let tile = y * params.tile_columns + x;
@@ -203,14 +203,19 @@ fn bin_splats(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-// Unsigned 64-bit numbers, low word first.
-fn add_64(sum: vec2u, value: u32) -> vec2u {
-    let low = sum.x + value;
-    return vec2u(low, sum.y + select(0u, 1u, low < value));
+// Four unsigned 64-bit sums, one for each pixel of an invocation.
+struct Sums {
+    low: vec4u,
+    high: vec4u,
 }
 
-fn f32_from_64(sum: vec2u) -> f32 {
-    return f32(sum.y) * 0x1p32 + f32(sum.x);
+fn add_64(sums: Sums, value: vec4u) -> Sums {
+    let low = sums.low + value;
+    return Sums(low, sums.high + select(vec4u(0u), vec4u(1u), low < value));
+}
+
+fn f32_from_64(sums: Sums) -> vec4f {
+    return vec4f(sums.high) * 0x1p32 + vec4f(sums.low);
 }
 
 // 2^e, for e within the exponents of normal floats.
@@ -218,29 +223,69 @@ fn power_of_two(e: i32) -> f32 {
     return bitcast<f32>(u32(clamp(e, -126, 127) + 127) << 23u);
 }
 
-// A batch of the tile's splats, and for each block of 4 x 4 pixels one bit for each splat that may touch it: a splat
-// misses most pixels of a tile, and a block need not look at those that miss it.
-var<workgroup> batch: array<Splat, 256>;
-var<workgroup> block_masks: array<atomic<u32>, 128>;
+// A batch of the tile's splats, and for each block of 8 x 8 pixels one bit for each splat that may touch it: a splat
+// misses most pixels of a tile, and a block need not look at those that miss it. An invocation serves 2 x 2 pixels, so
+// that it reads a splat once for four of them.
+const BATCH: u32 = 256u;
+const LANES: u32 = 64u;
+const BLOCK: i32 = 8;
+const BLOCKS_A_SIDE: i32 = 2;
+const WORDS_A_BLOCK: u32 = BATCH / 32u;
+
+var<workgroup> batch: array<Kernel, BATCH>;
+var<workgroup> block_masks: array<atomic<u32>, 32>;
 // First, count and brightest of the workgroup's tile
 var<workgroup> tile_list: vec3u;
 
-const BLOCK: i32 = 4;
-const WORDS_A_BLOCK: u32 = 8u;
-
 // Sets a splat's bit in every block of the tile that its pixels touch.
-fn mark_blocks(tile_corner: vec2i, range: vec4i, lane: u32) {
+fn mark_blocks(tile_corner: vec2i, range: vec4i, place: u32) {
     let first = max(range.xy - tile_corner, vec2i(0)) / BLOCK;
-    let last = min((range.zw - tile_corner) / BLOCK, vec2i(3));
+    let last = min((range.zw - tile_corner) / BLOCK, vec2i(BLOCKS_A_SIDE - 1));
     for (var y = first.y; y <= last.y; y++) {
         for (var x = first.x; x <= last.x; x++) {
-            let word = u32(4 * y + x) * WORDS_A_BLOCK + lane / 32u;
-            atomicOr(&block_masks[word], 1u << (lane % 32u));
+            let word = u32(BLOCKS_A_SIDE * y + x) * WORDS_A_BLOCK + place / 32u;
+            atomicOr(&block_masks[word], 1u << (place % 32u));
         }
     }
 }
 
-@compute @workgroup_size(256)
+// Positions and geometric normals of an invocation's four pixels, by coordinate; `seen` where there is a surface.
+struct Receivers {
+    x: vec4f,
+    y: vec4f,
+    z: vec4f,
+    normal_x: vec4f,
+    normal_y: vec4f,
+    normal_z: vec4f,
+    seen: vec4<bool>,
+}
+
+fn receiver_pixel(corner: vec2u, i: u32) -> vec2u {
+    return corner + vec2u(i % 2u, i / 2u);
+}
+
+fn receivers_at(corner: vec2u) -> Receivers {
+    var receivers: Receivers;
+    for (var i = 0u; i < 4u; i++) {
+        let pixel = receiver_pixel(corner, i);
+        if any(pixel >= view.size) || textureLoad(base_color_texture, pixel + view.origin, 0).a <= 0.0 {
+            continue;
+        }
+        let p = splat_position(view, vec2i(pixel));
+        let shading = g_buffer_normal(view, textureLoad(normal_texture, pixel + view.origin, 0));
+        let n = splat_receiver_normal(view, vec2i(pixel), p, shading);
+        receivers.x[i] = p.x;
+        receivers.y[i] = p.y;
+        receivers.z[i] = p.z;
+        receivers.normal_x[i] = n.x;
+        receivers.normal_y[i] = n.y;
+        receivers.normal_z[i] = n.z;
+        receivers.seen[i] = true;
+    }
+    return receivers;
+}
+
+@compute @workgroup_size(64)
 fn gather_tiles(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let tile = group.y * params.tile_columns + group.x;
     if lane == 0u {
@@ -254,52 +299,59 @@ fn gather_tiles(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
     // Sixteen neighbouring lanes share a block.
     let block = lane / 16u;
     let tile_corner = group.xy * TILE;
-    let id = tile_corner + 4u * vec2u(block % 4u, block / 4u) + vec2u(lane % 4u, (lane / 4u) % 4u);
-    let inside = all(id < view.size);
-    let pixel = min(id, view.size - 1u);
-    let at = pixel + view.origin;
-    let seen = inside && textureLoad(base_color_texture, at, 0).a > 0.0;
-    let p = splat_position(view, vec2i(pixel));
-    let shading = g_buffer_normal(view, textureLoad(normal_texture, at, 0));
-    let n = splat_receiver_normal(view, vec2i(pixel), p, shading);
+    let corner = tile_corner + 8u * vec2u(block % 2u, block / 2u) + 2u * vec2u(lane % 4u, (lane / 4u) % 4u);
+    let receivers = receivers_at(corner);
+    let any_seen = any(receivers.seen);
 
-    var red = vec2u(0u);
-    var green = vec2u(0u);
-    var blue = vec2u(0u);
-    for (var start = 0u; start < listed.y; start += 256u) {
-        if lane < 128u {
+    var red = Sums();
+    var green = Sums();
+    var blue = Sums();
+    for (var start = 0u; start < listed.y; start += BATCH) {
+        if lane < 32u {
             atomicStore(&block_masks[lane], 0u);
         }
         workgroupBarrier();
-        if start + lane < listed.y {
-            let index = list[listed.x + start + lane];
-            batch[lane] = splats[index];
-            mark_blocks(vec2i(tile_corner), unpack_pixels(rectangles[index]), lane);
+        for (var place = lane; place < min(BATCH, listed.y - start); place += LANES) {
+            let index = list[listed.x + start + place];
+            let splat = splats[index];
+            // In quanta, so that a receiver has only to weight and round.
+            let flux = splat.flux * to_quanta;
+            batch[place] = splat_prepare(splat.position, octahedral_unpack(splat.normal), splat.radius, flux);
+            mark_blocks(vec2i(tile_corner), unpack_pixels(rectangles[index]), place);
         }
         workgroupBarrier();
         for (var word = 0u; word < WORDS_A_BLOCK; word++) {
             var mask = atomicLoad(&block_masks[block * WORDS_A_BLOCK + word]);
-            if !seen {
-                mask = 0u;
-            }
-            while mask != 0u {
+            while any_seen && mask != 0u {
                 let i = 32u * word + countTrailingZeros(mask);
                 mask &= mask - 1u;
-                let d = p - batch[i].position;
-                if dot(d, d) < batch[i].radius * batch[i].radius {
-                    let splat = batch[i];
-                    let weight = splat_weight(p, n, splat.position, octahedral_unpack(splat.normal), splat.radius);
-                    let quanta = vec3u(round(splat.flux * weight * to_quanta));
-                    red = add_64(red, quanta.x);
-                    green = add_64(green, quanta.y);
-                    blue = add_64(blue, quanta.z);
+                let dx = receivers.x - batch[i].position.x;
+                let dy = receivers.y - batch[i].position.y;
+                let dz = receivers.z - batch[i].position.z;
+                let q = (dx * dx + dy * dy + dz * dz) * batch[i].inverse_radius_squared;
+                if !any(q < vec4f(1.0)) {
+                    continue;
                 }
+                let splat = batch[i];
+                let n = splat.normal;
+                let off_plane = abs(dx * n.x + dy * n.y + dz * n.z);
+                let agreement = receivers.normal_x * n.x + receivers.normal_y * n.y + receivers.normal_z * n.z;
+                let weight = splat_weight(q, off_plane, agreement, splat.slab) * vec4f(receivers.seen);
+                red = add_64(red, vec4u(round(splat.strength.x * weight)));
+                green = add_64(green, vec4u(round(splat.strength.y * weight)));
+                blue = add_64(blue, vec4u(round(splat.strength.z * weight)));
             }
         }
         workgroupBarrier();
     }
-    if inside {
-        let sum = vec3f(f32_from_64(red), f32_from_64(green), f32_from_64(blue));
-        textureStore(irradiance, id, vec4f(sum * power_of_two(exponent - 30), select(0.0, 1.0, seen)));
+    let from_quanta = power_of_two(exponent - 30);
+    let r = f32_from_64(red) * from_quanta;
+    let g = f32_from_64(green) * from_quanta;
+    let b = f32_from_64(blue) * from_quanta;
+    for (var i = 0u; i < 4u; i++) {
+        let pixel = receiver_pixel(corner, i);
+        if all(pixel < view.size) {
+            textureStore(irradiance, pixel, vec4f(r[i], g[i], b[i], 1.0));
+        }
     }
 }
