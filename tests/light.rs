@@ -2,7 +2,8 @@
 
 mod common;
 
-use common::{Component, Offline, Random, assert_no_errors, gpu, mean, offline};
+use common::statistics::Random;
+use common::{Component, Offline, assert_no_errors, gpu, mean, offline};
 use lightfall::frame::Settings;
 use lightfall::glam::{DAffine3, DVec3};
 use lightfall::pass::{Bandwidth, PhotonSplatterSettings, TraceMethod};
@@ -310,7 +311,7 @@ fn flux_of_every_light_is_the_integral_of_its_intensity() {
     let count = 400_000;
     let sum: f64 = (0..count)
         .map(|_| {
-            ((1.0 - 2.0 * random.unit() - outer) / (inner - outer))
+            ((1.0 - 2.0 * f64::from(random.unit()) - outer) / (inner - outer))
                 .clamp(0.0, 1.0)
                 .powi(2)
         })

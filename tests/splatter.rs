@@ -3,7 +3,8 @@
 
 mod common;
 
-use common::{Gpu, Random, Wishes, assert_no_errors, gpu, gpu_with};
+use common::statistics::Random;
+use common::{Gpu, Wishes, assert_no_errors, gpu, gpu_with};
 use lightfall::pass::{
     Bandwidth, Kernel, PhotonSplatter, PhotonSplatterConfig, PhotonSplatterInputs, PhotonSplatterResources,
     PhotonSplatterSettings, SplatShape,
@@ -64,9 +65,9 @@ fn plane_g_buffer(gpu: &Gpu) -> GBuffer {
 }
 
 /// A photon of this flux on the plane; normal +z is octahedral (0, 0).
-fn photon(x: f64, y: f64, flux: [f32; 3]) -> Photon {
+fn photon(x: f32, y: f32, flux: [f32; 3]) -> Photon {
     Photon {
-        position: [x as f32, y as f32, 0.0],
+        position: [x, y, 0.0],
         state: 1,
         flux,
         density: 1.0,
@@ -232,7 +233,7 @@ fn quads_in_thirty_two_bits_keep_all_energy_where_the_device_blends_them() {
 #[test]
 fn a_photon_gives_each_pixel_what_its_kernel_says() {
     let Some(gpu) = gpu() else { return };
-    let (x, y, h) = (0.013, -0.021, 0.3f64);
+    let (x, y, h) = (0.013f32, -0.021f32, 0.3f64);
     let pixels = splat(
         &gpu,
         config(SplatShape::Tiled),
@@ -241,7 +242,7 @@ fn a_photon_gives_each_pixel_what_its_kernel_says() {
     );
     for (i, pixel) in (0..).zip(&pixels) {
         let at = |k: u32| (f64::from(k) + 0.5) / f64::from(SIZE) * 2.0 - 1.0;
-        let (dx, dy) = (at(i % SIZE) - x, -at(i / SIZE) - y);
+        let (dx, dy) = (at(i % SIZE) - f64::from(x), -at(i / SIZE) - f64::from(y));
         let q = (dx * dx + dy * dy) / (h * h);
         let expected = if q < 1.0 {
             2.0 / std::f64::consts::PI * (1.0 - q) / (h * h)

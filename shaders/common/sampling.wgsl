@@ -10,6 +10,11 @@ fn sampling_frame(z: vec3f) -> mat3x3f {
     return mat3x3f(vec3f(1.0 + s * z.x * z.x * a, s * b, -s * z.x), vec3f(b, s + z.y * z.y * a, -z.y), z);
 }
 
+// 1 - cos of the angle between unit vectors. As half their squared distance it keeps its digits at small angles.
+fn sampling_one_minus_cos(a: vec3f, b: vec3f) -> f32 {
+    return 0.5 * dot(a - b, a - b);
+}
+
 // Uniform on the sphere: pdf 1/(4 pi).
 fn sampling_sphere(u: vec2f) -> vec3f {
     let z = 1.0 - 2.0 * u.x;

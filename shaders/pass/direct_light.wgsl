@@ -47,9 +47,7 @@ fn unoccluded(light: Light, p: vec3f, n: vec3f) -> vec3f {
     let l = to_light * inverseSqrt(distance_squared);
     var falloff = 1.0;
     if light.kind == LIGHT_SPOT {
-        // 1 - cos as half the squared distance of unit vectors keeps its digits at small angles.
-        let off_axis = l + light.direction;
-        falloff = sampling_spot_falloff(0.5 * dot(off_axis, off_axis), light.inner, light.outer);
+        falloff = sampling_spot_falloff(sampling_one_minus_cos(-l, light.direction), light.inner, light.outer);
     }
     return light.intensity * (falloff * max(0.0, dot(n, l)) / distance_squared);
 }

@@ -29,7 +29,8 @@ fn emit(light: Light, sequence_index: u32) -> Emission {
         case LIGHT_SPOT: {
             let local = sampling_spot(u, light.inner, light.outer);
             let direction = mat3x3f(light.right, light.up, light.direction) * local;
-            let falloff = sampling_spot_falloff(1.0 - local.z, light.inner, light.outer);
+            let v = sampling_one_minus_cos(local, vec3f(0.0, 0.0, 1.0));
+            let falloff = sampling_spot_falloff(v, light.inner, light.outer);
             return Emission(light_ray(light, normalize(direction), vec2f(0.0)), light.density * falloff);
         }
         default: {

@@ -1,8 +1,10 @@
 //! What the tests share: a device, small scenes, statements about images.
 #![allow(dead_code, unused_imports, reason = "each test file uses its own part of this")]
 
+pub(crate) mod evaluate;
 #[path = "../../examples/common/mod.rs"]
 mod examples;
+pub(crate) mod statistics;
 
 pub(crate) use examples::adapter::{Gpu, Wishes};
 pub(crate) use examples::exr_file;
@@ -37,18 +39,4 @@ pub(crate) fn mean(pixels: &[[f32; 3]], width: u32, channel: usize, keep: impl F
     let kept = (0..).zip(pixels).filter(|(i, _)| keep(i % width, i / width));
     let (sum, count) = kept.fold((0.0, 0), |(s, n), (_, p)| (s + f64::from(p[channel]), n + 1));
     sum / f64::from(count)
-}
-
-/// A small generator for test data (splitmix64).
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    /// Uniform in [0, 1).
-    pub(crate) fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
 }
