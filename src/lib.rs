@@ -112,6 +112,7 @@
 mod error;
 pub mod frame;
 mod gpu;
+mod halton;
 pub mod pass;
 mod read_back;
 #[cfg(feature = "reference")]

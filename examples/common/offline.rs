@@ -82,10 +82,7 @@ impl<'a> Offline<'a> {
             .set_scene(queue, &SceneSummary::of(&self.scene)?, &self.scene.lights)?;
         self.composite.output_scale = frame.output_scale(1.0)?;
         let jitter = match self.accumulator {
-            Some(_) => [
-                radical_inverse(self.frames + 1, 2) - 0.5,
-                radical_inverse(self.frames + 1, 3) - 0.5,
-            ],
+            Some(_) => CameraView::jitter(self.frames),
             None => [0.0; 2],
         };
         let mut cameras = [CameraView::new(
@@ -215,15 +212,4 @@ fn wait(device: &wgpu::Device) -> Result<(), Error> {
             what: "the frame",
             reason: e.to_string(),
         })
-}
-
-/// `index` mirrored at the radix point: jitter that covers a pixel evenly.
-fn radical_inverse(mut index: u32, base: u32) -> f64 {
-    let (mut value, mut weight) = (0.0, 1.0);
-    while index > 0 {
-        weight /= f64::from(base);
-        value += weight * f64::from(index % base);
-        index /= base;
-    }
-    value
 }

@@ -7,6 +7,7 @@
 
 use super::capture;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
+use crate::halton::radical_inverse;
 use crate::resource::{CaptureView, EnvMaps, Geometry};
 use crate::{Error, Timestamps, read_back, wgsl};
 use glam::Vec3;
@@ -243,17 +244,6 @@ fn sight(record: &gpu::SightRecord) -> Sight {
             f32::from_bits(record.nearest)
         },
     }
-}
-
-/// `index` mirrored at the radix point.
-fn radical_inverse(mut index: u32, base: u32) -> f64 {
-    let (mut value, mut weight) = (0.0, 1.0);
-    while index > 0 {
-        weight /= f64::from(base);
-        value += weight * f64::from(index % base);
-        index /= base;
-    }
-    value
 }
 
 #[cfg(test)]

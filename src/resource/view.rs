@@ -1,6 +1,7 @@
 //! What a view looks at: the matrices, eye and purpose that the host's draws need.
 
 use super::cube_face::{CUBE_FACES, CubeFace};
+use crate::halton::radical_inverse;
 use crate::scene::{Camera, Projection, UnitFrame};
 use glam::{DMat4, DVec3, Mat4, Vec3, Vec4};
 
@@ -170,6 +171,12 @@ impl CameraView {
             eye_or_direction.to_array(),
             pixels_per_radian as f32,
         )
+    }
+
+    /// Where in its pixel frame `index` of an accumulation looks, in (−1/2, 1/2)²: evenly spread over any number of
+    /// frames.
+    pub fn jitter(index: u32) -> [f64; 2] {
+        [2, 3].map(|base| radical_inverse(index.wrapping_add(1), base) - 0.5)
     }
 
     /// A host's own view: unit frame to clip space (any depth convention that its G-buffer uses), and the eye position
