@@ -11,6 +11,11 @@ pub struct Radiance {
 }
 
 impl Radiance {
+    /// Bytes of an `rgba32float` texture of this size.
+    pub fn size_in_bytes(size: [u32; 2]) -> u64 {
+        gpu::texture_bytes(size, 1, wgpu::TextureFormat::Rgba32Float)
+    }
+
     /// An `rgba32float` texture.
     ///
     /// # Errors
