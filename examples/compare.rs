@@ -43,10 +43,25 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    match run(&Arguments::parse()) {
-        Ok(line) => {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) if !error.use_stderr() => error.exit(),
+        Err(error) => {
+            // The first paragraph says what is wrong; usage follows.
+            let text = error.to_string();
+            let what: Vec<&str> = text.lines().take_while(|l| !l.is_empty()).map(str::trim).collect();
+            eprintln!("compare: {}", what.join(" ").trim_start_matches("error: "));
+            return ExitCode::from(2);
+        }
+    };
+    match run(&arguments) {
+        Ok((line, is_finite)) => {
             println!("{line}");
-            ExitCode::SUCCESS
+            if is_finite {
+                ExitCode::SUCCESS
+            } else {
+                ExitCode::FAILURE
+            }
         }
         Err(problem) => {
             eprintln!("compare: {problem}");
@@ -55,7 +70,8 @@ fn main() -> ExitCode {
     }
 }
 
-fn run(arguments: &Arguments) -> Result<Value, String> {
+/// The report, and whether the image is finite.
+fn run(arguments: &Arguments) -> Result<(Value, bool), String> {
     let image = truth_file::read_image(&arguments.ours)?;
     let truth = truth_file::read_truth(&arguments.truth)?;
     let between = |error| {
@@ -69,7 +85,7 @@ fn run(arguments: &Arguments) -> Result<Value, String> {
     if let Some(path) = &arguments.png {
         write_picture(path, &image, &truth)?;
     }
-    Ok(report(&comparison, &truth))
+    Ok((report(&comparison, &truth), comparison.finite))
 }
 
 fn report(comparison: &Comparison, truth: &Truth) -> Value {

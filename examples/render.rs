@@ -123,8 +123,10 @@ struct Arguments {
 fn main() {
     let arguments = Arguments::try_parse().unwrap_or_else(|error| {
         if error.use_stderr() {
+            // The first paragraph says what is wrong; usage follows.
             let text = error.to_string();
-            fail(text.lines().next().unwrap_or_default().trim_start_matches("error: "));
+            let what: Vec<&str> = text.lines().take_while(|l| !l.is_empty()).map(str::trim).collect();
+            fail(what.join(" ").trim_start_matches("error: "));
         }
         error.exit()
     });
@@ -171,6 +173,7 @@ fn run(arguments: &Arguments) -> Result<(), String> {
             clock.frame(&gpu, &mut offline, timestamps.as_ref())?;
             bar.inc(1);
         }
+        check_device(&gpu)?;
         if let Some(out) = &arguments.out {
             let path = if arguments.animate.is_some() {
                 numbered(out, number)
@@ -186,18 +189,24 @@ fn run(arguments: &Arguments) -> Result<(), String> {
             clock.frame(&gpu, &mut offline, timestamps.as_ref())?;
         }
     }
-    if let Some(error) = gpu.take_errors().first() {
-        return Err(format!(
-            "the device reported: {}",
-            error.lines().next().unwrap_or_default()
-        ));
-    }
+    check_device(&gpu)?;
     if let Some(path) = &arguments.stats {
         let report = report(&gpu, &offline, &settings, &clock)?;
         let text = serde_json::to_string_pretty(&report).map_err(|e| e.to_string())?;
         exr_file::replace_file(path, text.as_bytes())?;
     }
     Ok(())
+}
+
+/// Nothing is written of what the device did not render as it was told.
+fn check_device(gpu: &Gpu) -> Result<(), String> {
+    match gpu.take_errors().first() {
+        Some(error) => Err(format!(
+            "the device reported: {}",
+            error.lines().next().unwrap_or_default()
+        )),
+        None => Ok(()),
+    }
 }
 
 /// Refuses what a later version will do, by name; returns the component.

@@ -2,15 +2,14 @@
 
 /// Anything that a constructor or a validation can refuse.
 ///
-/// Recording a pass never fails on the frame path: what could go wrong is refused when the pass, its resources or its
-/// inputs are made.
+/// Recording a pass does not fail: what could go wrong is refused when the pass, its resources or its inputs are made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A mesh, instance, material, texture, light or camera holds something that cannot be rendered.
     #[error("{item} {name:?}: {field} {problem}")]
     InvalidScene {
-        /// What kind of thing it is: "mesh", "instance", "material", "texture", "light", "camera".
+        /// What kind of thing it is: "mesh", "instance", "material", "texture", "light", "camera", "summary".
         item: &'static str,
         /// Its name, or its index where it has none.
         name: String,
@@ -59,7 +58,7 @@ pub enum Error {
     IncompatibleView {
         /// Which resource and which of its views.
         resource: &'static str,
-        /// Which property: "format", "size", "usage", "sample count", "layer count", "dimension".
+        /// Which property: "format", "size", "usage", "sample count", "mip level count", "layer count", "dimension".
         property: &'static str,
         /// What it should be.
         expected: String,

@@ -119,20 +119,19 @@ pub(crate) fn layer_view(texture: &wgpu::Texture, layer: u32) -> wgpu::TextureVi
     })
 }
 
-/// Creates a buffer after checking it against the device's limits. Sizes are rounded up to a multiple of four.
-pub(crate) fn buffer(
+/// Checks the size of a buffer against the device's limits.
+pub(crate) fn check_buffer(
     device: &wgpu::Device,
     label: &'static str,
     size: u64,
     usage: wgpu::BufferUsages,
-) -> Result<wgpu::Buffer, Error> {
+) -> Result<(), Error> {
     let limits = device.limits();
     let limit = if usage.contains(wgpu::BufferUsages::STORAGE) {
         limits.max_buffer_size.min(limits.max_storage_buffer_binding_size)
     } else {
         limits.max_buffer_size
     };
-    let size = size.max(4).next_multiple_of(4);
     if size > limit {
         return Err(Error::LimitExceeded {
             what: format!("{label} of {size} bytes"),
@@ -141,6 +140,18 @@ pub(crate) fn buffer(
             remedy: "use fewer photons, bounces or instances, or request a larger limit",
         });
     }
+    Ok(())
+}
+
+/// Creates a buffer after checking it against the device's limits. Sizes are rounded up to a multiple of four.
+pub(crate) fn buffer(
+    device: &wgpu::Device,
+    label: &'static str,
+    size: u64,
+    usage: wgpu::BufferUsages,
+) -> Result<wgpu::Buffer, Error> {
+    let size = size.max(4).next_multiple_of(4);
+    check_buffer(device, label, size, usage)?;
     count(|c| {
         c.buffers += 1;
         c.bytes += size;

@@ -54,6 +54,7 @@ fn bad_input_gets_one_line_status_two_and_no_file() {
     let out = folder.join("image.exr");
     let out = out.to_str().unwrap();
     let cases: &[(&[&str], &str)] = &[
+        (&[], "SCENE"),
         (&["no-such-file.glb"], "no-such-file.glb"),
         (&[broken], "broken.glb"),
         (&["sample:teapot"], "cornell"),

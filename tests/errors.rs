@@ -365,6 +365,34 @@ fn counts_that_do_not_agree_are_named() {
 }
 
 #[test]
+fn a_summary_that_contradicts_itself_is_refused() {
+    on_device(|device, queue| {
+        let scene = samples::cornell(0.0);
+        let summary = SceneSummary::of(&scene).unwrap();
+        let mut renderer = GiRenderer::new(device, &Settings::fast()).unwrap();
+        let area = |area| SceneSummary {
+            area,
+            ..summary.clone()
+        };
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let error = renderer.set_scene(queue, &area(bad), &scene.lights).unwrap_err();
+            assert!(error.to_string().contains("area"), "{error}");
+        }
+        let error = renderer.set_scene(queue, &summary, &[]).unwrap_err();
+        assert!(matches!(error, Error::CountMismatch { .. }), "{error}");
+        let mut broken = scene;
+        broken.instances[0].mesh = 99;
+        assert!(matches!(SceneSummary::of(&broken), Err(Error::InvalidScene { .. })));
+        broken.instances[0].mesh = 0;
+        broken.meshes[0].indices[0] = 99;
+        assert!(matches!(SceneSummary::of(&broken), Err(Error::InvalidScene { .. })));
+        broken.meshes[0].indices[0] = 0;
+        broken.meshes[0].positions[0][0] = f32::NAN;
+        assert!(SceneSummary::of(&broken).is_err());
+    });
+}
+
+#[test]
 fn moving_an_instance_that_is_not_there_is_refused() {
     on_device(|device, queue| {
         let mut geometry = MeshGeometry::new(device, queue, &samples::plane()).unwrap();

@@ -60,22 +60,37 @@ fn record(
 fn every_pass_is_made_and_recorded_on_a_device_that_grants_only_the_defaults() {
     let descriptor = wgpu::DeviceDescriptor::default();
     assert_eq!(descriptor.required_limits, wgpu::Limits::default());
+    assert_eq!(descriptor.required_features, wgpu::Features::empty());
     let (device, queue) = wgpu::Device::noop(&descriptor);
+    make_and_record_every_pass(&device, &queue);
+    if let Some(gpu) = gpu() {
+        make_and_record_every_pass(&gpu.device, &gpu.queue);
+        assert_no_errors(&gpu);
+    }
+}
+
+fn make_and_record_every_pass(device: &wgpu::Device, queue: &wgpu::Queue) {
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
-    for shape in [SplatShape::Tiled, SplatShape::Quads] {
+    for (shape, kernel, method) in [
+        (SplatShape::Tiled, Kernel::Epanechnikov, TraceMethod::OrderedMarch),
+        (SplatShape::Tiled, Kernel::Cone, TraceMethod::Plane),
+        (SplatShape::Quads, Kernel::Constant, TraceMethod::Paper),
+    ] {
         let mut settings = small();
         settings.splatter_config.shape = shape;
+        settings.splatter_config.kernel = kernel;
+        settings.tracer.method = method;
         for name in samples::NAMES {
             let scene = samples::by_name(name, 0.5).unwrap();
-            let mut geometry = MeshGeometry::new(&device, &queue, &scene).unwrap();
-            let mut renderer = GiRenderer::new(&device, &settings).unwrap();
+            let mut geometry = MeshGeometry::new(device, queue, &scene).unwrap();
+            let mut renderer = GiRenderer::new(device, &settings).unwrap();
             let mut view = renderer.new_view([33, 17]).unwrap();
-            let encoder = record(&mut renderer, &mut view, &mut geometry, &scene, (&device, &queue));
+            let encoder = record(&mut renderer, &mut view, &mut geometry, &scene, (device, queue));
             queue.submit([encoder.finish()]);
-            renderer.place_env_maps_blocking(&queue, &mut geometry).unwrap();
+            renderer.place_env_maps_blocking(queue, &mut geometry).unwrap();
         }
     }
-    record_the_other_passes(&device, &queue);
+    record_the_other_passes(device, queue);
     let error = pollster::block_on(scope.pop());
     assert!(error.is_none(), "{error:?}");
 }
@@ -473,5 +488,61 @@ fn two_views_of_one_scene_share_its_photons() {
         let pixels = read_rgba32float_blocking(device, queue, view.radiance().view().texture()).unwrap();
         assert!(pixels.iter().filter(|p| p[0] > 0.0).count() > pixels.len() / 2);
     }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn a_view_made_for_other_settings_is_made_anew() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::cornell(0.0);
+    let device = (&gpu.device, &gpu.queue);
+    let mut geometry = MeshGeometry::new(device.0, device.1, &scene).unwrap();
+    let mut few = GiRenderer::new(
+        device.0,
+        &Settings {
+            photons: 500,
+            ..small()
+        },
+    )
+    .unwrap();
+    let mut many = GiRenderer::new(device.0, &small()).unwrap();
+    let mut reused = few.new_view([24, 24]).unwrap();
+    let mut own = many.new_view([24, 24]).unwrap();
+    let mut show = |renderer: &mut GiRenderer, view: &mut ViewResources| {
+        let encoder = record(renderer, view, &mut geometry, &scene, device);
+        gpu.queue.submit([encoder.finish()]);
+        read_rgba32float_blocking(device.0, device.1, view.radiance().view().texture()).unwrap()
+    };
+    show(&mut few, &mut reused);
+    assert!(show(&mut many, &mut reused) == show(&mut many, &mut own));
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn maps_stay_where_they_were_placed_while_the_light_is_off() {
+    let Some(gpu) = gpu() else { return };
+    let (device, queue) = (&gpu.device, &gpu.queue);
+    let scene = samples::cornell(0.0);
+    let mut geometry = MeshGeometry::new(device, queue, &scene).unwrap();
+    let mut renderer = GiRenderer::new(device, &small()).unwrap();
+    let summary = SceneSummary::of(&scene).unwrap();
+    let dark = SceneSummary {
+        lights: 0,
+        ..summary.clone()
+    };
+    renderer.set_scene(queue, &dark, &[]).unwrap();
+    assert!(renderer.env_maps().is_none() && renderer.shadow_maps().is_none());
+    renderer.place_env_maps_blocking(queue, &mut geometry).unwrap();
+    renderer.set_scene(queue, &summary, &scene.lights).unwrap();
+    let placed = renderer.env_maps().unwrap().centers().to_vec();
+    let frame = *renderer.frame().unwrap();
+    let candidates = EnvMapSelector::candidates(frame.point(summary.bounds.min), frame.point(summary.bounds.max), 3);
+    assert_ne!(
+        placed, candidates,
+        "the first candidate stands in the tall block and was passed over"
+    );
+    renderer.set_scene(queue, &dark, &[]).unwrap();
+    renderer.set_scene(queue, &summary, &scene.lights).unwrap();
+    assert_eq!(renderer.env_maps().unwrap().centers(), placed);
     assert_no_errors(&gpu);
 }

@@ -19,7 +19,8 @@ use crate::resource::{
 };
 use crate::scene::{Light, SceneSummary, UnitFrame};
 use crate::{Error, Timestamps};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// All passes and the resources that views share.
 #[derive(Debug)]
@@ -31,6 +32,10 @@ pub struct GiRenderer {
     direct: Option<DirectScene>,
     indirect: Option<IndirectScene>,
     state: Option<SceneState>,
+    /// Where environment maps were placed, world space; they outlive the maps.
+    centers: Option<Vec<DVec3>>,
+    /// Changes whenever a resource that views bind is made anew; no two renderers share one.
+    generation: u64,
     /// All views of the frame, indexed; the last `prepare` filled it.
     views: Vec<CaptureView>,
     light_views: std::ops::Range<usize>,
@@ -89,6 +94,8 @@ pub struct ViewResources {
     direct: Option<(Irradiance, DirectLightResources)>,
     indirect: Option<(Irradiance, PhotonSplatterResources)>,
     size: [u32; 2],
+    /// Of the renderer that `direct` and `indirect` were made for.
+    generation: u64,
 }
 
 /// What [`GiRenderer::record_scene`] needs.
@@ -157,6 +164,8 @@ impl GiRenderer {
             direct: None,
             indirect: None,
             state: None,
+            centers: None,
+            generation: next_generation(),
             views: Vec::new(),
             light_views: 0..0,
             env_map_views: 0..0,
@@ -177,6 +186,7 @@ impl GiRenderer {
         for (index, light) in lights.iter().enumerate() {
             light.validate(index)?;
         }
+        summary.validate(lights.len())?;
         let frame = match &self.state {
             Some(state) => state.frame.follow(&summary.bounds, summary.total_flux)?,
             None => UnitFrame::new(&summary.bounds, summary.total_flux)?,
@@ -184,31 +194,18 @@ impl GiRenderer {
         let plan = Plan::for_scene(summary, &self.settings);
         self.allocate(&plan, lights)?;
         let length = frame.length_scale();
-        let state = SceneState {
+        self.state = Some(SceneState {
             frame,
             plan,
             lights: lights.to_vec(),
             min: frame.point(summary.bounds.min),
             max: frame.point(summary.bounds.max),
             area: (summary.area / (length * length)) as f32,
-        };
+        });
         if let Some(direct) = &mut self.direct {
             direct.lights.write(queue, &frame, lights, self.settings.photons)?;
         }
-        if let Some(indirect) = &mut self.indirect {
-            let centers = indirect.env_maps.centers();
-            let centers = match &self.state {
-                Some(old) if !centers.is_empty() && old.frame == frame => centers.to_vec(),
-                // Maps stay where they are in the world when the frame is renewed.
-                Some(old) if !centers.is_empty() => {
-                    let world = centers.iter().map(|&c| old.frame.world_point(c));
-                    world.map(|c| frame.point(c)).collect()
-                }
-                _ => EnvMapSelector::candidates(state.min, state.max, self.settings.env_map_count),
-            };
-            indirect.env_maps.set_centers(queue, &centers)?;
-        }
-        self.state = Some(state);
+        self.apply_centers(queue)?;
         Ok(frame)
     }
 
@@ -221,6 +218,10 @@ impl GiRenderer {
             .as_ref()
             .is_none_or(|d| d.shadow_layers != ShadowMaps::layers(lights))
         {
+            self.generation = next_generation();
+            if let Some(indirect) = &mut self.indirect {
+                indirect.emitter = PhotonEmitterResources::new(device)?;
+            }
             self.direct = Some(DirectScene {
                 lights: Lights::new(device)?,
                 shadow_maps: ShadowMaps::new(device, lights, settings.shadow_map_size)?,
@@ -231,6 +232,8 @@ impl GiRenderer {
         if !plan.is_on(Stage::ImageSpaceTracer) {
             self.indirect = None;
         } else if self.indirect.is_none() {
+            PhotonSplatterResources::check(device, &settings.splatter_config, settings.photons, settings.bounces)?;
+            self.generation = next_generation();
             self.indirect = Some(IndirectScene {
                 env_maps: EnvMaps::new(device, settings.env_map_count, settings.env_map_size)?,
                 capture: EnvMapCaptureResources::new(device, settings.env_map_size)?,
@@ -242,13 +245,26 @@ impl GiRenderer {
         Ok(())
     }
 
+    /// Writes the centres of the environment maps in the current frame: where they were placed, or the first candidates.
+    fn apply_centers(&mut self, queue: &wgpu::Queue) -> Result<(), Error> {
+        let (Some(state), Some(indirect)) = (&self.state, &mut self.indirect) else {
+            return Ok(());
+        };
+        let centers = match &self.centers {
+            Some(world) => world.iter().map(|&c| state.frame.point(c)).collect(),
+            None => EnvMapSelector::candidates(state.min, state.max, self.settings.env_map_count),
+        };
+        indirect.env_maps.set_centers(queue, &centers)
+    }
+
     /// Tries the candidates and places the environment maps at the first valid ones. Submits and waits: for headless use
-    /// and loading screens. Until it is called, maps stand at the first candidates, valid or not.
+    /// and loading screens. Until it is called, maps stand at the first candidates, valid or not. It prepares the geometry
+    /// for views of its own: call it after `set_scene` and before `prepare`.
     ///
     /// # Errors
     /// [`Error::ReadBack`], [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
     pub fn place_env_maps_blocking(&mut self, queue: &wgpu::Queue, geometry: &mut dyn Geometry) -> Result<(), Error> {
-        let (Some(state), Some(indirect)) = (&self.state, &mut self.indirect) else {
+        let Some(state) = &self.state else {
             return Ok(());
         };
         let settings = &self.settings.selector;
@@ -277,19 +293,26 @@ impl GiRenderer {
         let sights = resources.read_blocking(&self.device, queue)?;
         let radius = state.frame.radius();
         let chosen = EnvMapSelector::choose(&sights, settings, radius, self.settings.env_map_count as usize);
-        let centers: Vec<Vec3> = chosen.into_iter().map(|i| candidates[i]).collect();
-        indirect.env_maps.set_centers(queue, &centers)
+        let world = chosen.into_iter().map(|i| state.frame.world_point(candidates[i]));
+        self.centers = Some(world.collect());
+        self.apply_centers(queue)
     }
 
-    /// Places the environment maps by hand, unit frame; up to [`Settings::env_map_count`].
+    /// Places the environment maps by hand, world space; up to [`Settings::env_map_count`].
     ///
     /// # Errors
     /// [`Error::CountMismatch`] for too many.
-    pub fn set_env_map_centers(&mut self, queue: &wgpu::Queue, centers: &[Vec3]) -> Result<(), Error> {
-        match &mut self.indirect {
-            Some(indirect) => indirect.env_maps.set_centers(queue, centers),
-            None => Ok(()),
+    pub fn set_env_map_centers(&mut self, queue: &wgpu::Queue, centers: &[DVec3]) -> Result<(), Error> {
+        let most = self.settings.env_map_count as usize;
+        if centers.len() > most {
+            return Err(Error::CountMismatch {
+                what: "environment-map centres (most that the settings allow)",
+                expected: most,
+                found: centers.len(),
+            });
         }
+        self.centers = Some(centers.to_vec());
+        self.apply_centers(queue)
     }
 
     /// Collects every view of the frame, numbers them, and lets the geometry prepare for them.
@@ -391,6 +414,7 @@ impl GiRenderer {
             direct: None,
             indirect: None,
             size,
+            generation: self.generation,
         })
     }
 
@@ -457,6 +481,11 @@ impl GiRenderer {
 
     fn allocate_view(&self, view: &mut ViewResources) -> Result<(), Error> {
         let (device, size) = (&self.device, view.size);
+        if view.generation != self.generation {
+            // Another renderer's, or from before a resource was replaced: neither fits, and both would keep it alive.
+            (view.direct, view.indirect) = (None, None);
+            view.generation = self.generation;
+        }
         match &self.direct {
             None => view.direct = None,
             Some(_) if view.direct.is_none() => {
@@ -583,4 +612,10 @@ fn number(views: &mut [CaptureView]) {
     for (index, view) in (0..).zip(views) {
         view.index = index;
     }
+}
+
+/// A number that no renderer has had yet.
+fn next_generation() -> u64 {
+    static NEXT: AtomicU64 = AtomicU64::new(0);
+    NEXT.fetch_add(1, Ordering::Relaxed)
 }

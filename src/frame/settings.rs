@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::pass::{
-    Bandwidth, EnvMapSelectorSettings, ImageSpaceTracerSettings, Kernel, PhotonSplatterConfig, PhotonSplatterSettings,
-    SplatShape, TraceMethod,
+    Bandwidth, EnvMapSelectorSettings, ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS, PhotonSplatterConfig,
+    PhotonSplatterSettings, SplatShape, TraceMethod,
 };
 
 /// Most scatterings of a path.
@@ -197,14 +197,20 @@ macro_rules! field {
     };
 }
 
-/// A knob over an enumeration with names.
+/// A knob over a field that takes one of a few values, each with a name.
 macro_rules! choice {
-    ($name:literal, $expected:literal, $($path:ident).+, $([$text:literal, $value:path]),+) => {
+    ($name:literal, $expected:literal, $($path:ident).+, $([$text:literal, $value:expr]),+) => {
         Knob {
             name: $name,
             expected: $expected,
-            get: |s| match s.$($path).+ { $($value => $text),+ }.to_string(),
-            set: |s, v| { s.$($path).+ = match v { $($text => $value,)+ _ => return None }; Some(()) },
+            get: |s| {
+                let named = [$(($text, $value)),+].into_iter().find(|(_, value)| *value == s.$($path).+);
+                named.map_or("unnamed", |(text, _)| text).to_string()
+            },
+            set: |s, v| {
+                s.$($path).+ = [$(($text, $value)),+].into_iter().find(|(text, _)| *text == v)?.1;
+                Some(())
+            },
             is_valid: |_| true,
         }
     };
@@ -244,6 +250,14 @@ const KNOBS: &[Knob] = &[
         splatter_config.shape,
         ["tiled", SplatShape::Tiled],
         ["quads", SplatShape::Quads]
+    ),
+    choice!(
+        "splatter.blend_format",
+        "default, rgba16float or rgba32float (quads only)",
+        splatter_config.blend_format,
+        ["default", None],
+        ["rgba16float", Some(wgpu::TextureFormat::Rgba16Float)],
+        ["rgba32float", Some(wgpu::TextureFormat::Rgba32Float)]
     ),
     choice!(
         "splatter.kernel",
@@ -308,8 +322,12 @@ const KNOBS: &[Knob] = &[
             Bandwidth::Density { .. } => true,
         },
     },
-    field!("splatter.max_radius", "above 0, in pixels", splatter.max_radius, |v| v
-        > 0.0),
+    field!(
+        "splatter.max_radius",
+        "above 0, up to 23 pixels",
+        splatter.max_radius,
+        |v| v > 0.0 && v <= LARGEST_RADIUS
+    ),
 ];
 
 #[cfg(test)]

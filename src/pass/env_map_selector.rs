@@ -42,6 +42,9 @@ const CANDIDATE_SIZE: u32 = 32;
 /// Candidates keep this share of the region's extent away from its border.
 const MARGIN: f64 = 0.03;
 
+/// Least extent of the candidates' box along any axis, as a share of the region's diagonal.
+const THINNEST: f32 = 0.1;
+
 /// What to try, and what to accept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnvMapSelectorSettings {
@@ -128,8 +131,13 @@ impl EnvMapSelector {
         }
     }
 
-    /// `count` candidate positions between two corners of the region, unit frame.
+    /// `count` candidate positions between two corners of the region, unit frame. A region flatter than a tenth of its
+    /// diagonal is thickened to that, so that places beside its surfaces are tried.
     pub fn candidates(min: Vec3, max: Vec3, count: u32) -> Vec<Vec3> {
+        let thinnest = THINNEST * (max - min).length();
+        let middle = 0.5 * (min + max);
+        let half = (0.5 * (max - min)).max(Vec3::splat(0.5 * thinnest));
+        let (min, max) = (middle - half, middle + half);
         let at = |i: u32, axis: usize, base: u32| {
             let share = MARGIN + (1.0 - 2.0 * MARGIN) * radical_inverse(i + 1, base);
             (f64::from(min[axis]) + share * f64::from(max[axis] - min[axis])) as f32
@@ -174,8 +182,8 @@ impl EnvMapSelector {
         pass.dispatch_workgroups(resources.env_maps.centers().len() as u32, 1, 1);
     }
 
-    /// Indices of up to `count` candidates: valid ones in their order, then, if they are too few, the others by how few
-    /// back faces they see.
+    /// Indices of up to `count` candidates: the valid ones in their order; if there is none, those that see the fewest
+    /// back faces, so that a scene of inside-out surfaces still gets its light.
     pub fn choose(sights: &[Sight], settings: &EnvMapSelectorSettings, radius: f32, count: usize) -> Vec<usize> {
         let is_valid = |s: &Sight| {
             s.surfaces > 0.0
@@ -184,7 +192,9 @@ impl EnvMapSelector {
         };
         let (mut order, mut others): (Vec<usize>, Vec<usize>) = (0..sights.len()).partition(|&i| is_valid(&sights[i]));
         others.sort_by(|&a, &b| sights[a].back_faces.total_cmp(&sights[b].back_faces));
-        order.append(&mut others);
+        if order.is_empty() {
+            order = others;
+        }
         order.truncate(count);
         order
     }
@@ -268,8 +278,16 @@ mod tests {
             seen(0.0, 0.001),
         ];
         let settings = EnvMapSelectorSettings::default();
-        assert_eq!(EnvMapSelector::choose(&sights, &settings, 1.0, 5), [1, 3, 4, 2, 0]);
+        assert_eq!(EnvMapSelector::choose(&sights, &settings, 1.0, 5), [1, 3]);
         assert_eq!(EnvMapSelector::choose(&sights, &settings, 1.0, 1), [1]);
+        let walled_in = [seen(0.9, 1.0), seen(0.5, 1.0), seen(0.7, 1.0)];
+        assert_eq!(EnvMapSelector::choose(&walled_in, &settings, 1.0, 2), [1, 2]);
+    }
+
+    #[test]
+    fn a_flat_region_is_tried_on_both_sides() {
+        let all = EnvMapSelector::candidates(Vec3::new(-0.5, 0.0, -0.5), Vec3::new(0.5, 0.0, 0.5), 40);
+        assert!(all.iter().any(|c| c.y > 0.02) && all.iter().any(|c| c.y < -0.02));
     }
 
     #[test]

@@ -31,6 +31,7 @@ pub use image_space_tracer::{
     ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, ImageSpaceTracerSettings, TraceMethod,
 };
 pub use photon_emitter::{PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources};
+pub(crate) use photon_splatter::LARGEST_RADIUS;
 pub use photon_splatter::{
     Bandwidth, Kernel, PhotonSplatter, PhotonSplatterConfig, PhotonSplatterInputs, PhotonSplatterResources,
     PhotonSplatterSettings, SplatShape,

@@ -103,7 +103,7 @@ pub(crate) const TILES_A_SIDE: u32 = 4;
 
 /// Largest kernel radius, pixels, that `TILES_A_SIDE` tiles hold wherever it lies: with a pixel of slack to each side it
 /// spans 48 pixels, and so at most 48 + 16.
-const LARGEST_RADIUS: f32 = 23.0;
+pub(crate) const LARGEST_RADIUS: f32 = 23.0;
 
 /// How a photon's kernel is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -415,6 +415,20 @@ impl PhotonSplatterResources {
             SplatShape::Tiled => working_sizes(slots, size).iter().sum::<u64>() + size_of::<gpu::TiledParams>() as u64,
             SplatShape::Quads => size_of::<gpu::QuadParams>() as u64,
         }
+    }
+
+    /// Whether working memory for this many paths and bounces fits the device, without making it.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`].
+    pub fn check(device: &wgpu::Device, config: &PhotonSplatterConfig, count: u32, bounces: u32) -> Result<(), Error> {
+        if config.shape == SplatShape::Quads {
+            return Ok(());
+        }
+        let slots = count.saturating_mul(bounces);
+        let largest = working_sizes(slots, [1, 1]).into_iter().max().unwrap_or(0);
+        let usage = wgpu::BufferUsages::STORAGE;
+        device::check_buffer(device, "lightfall::PhotonSplatter::list", largest, usage)
     }
 
     /// Working memory for this many photons and this size of G-buffer.

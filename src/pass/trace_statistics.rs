@@ -124,7 +124,8 @@ impl TraceStatistics {
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.sum);
         pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups(inputs.photons.bounces() + 1, 1, 1);
+        let room = (resources.hops.size() / size_of::<gpu::Sums>() as u64) as u32;
+        pass.dispatch_workgroups(room.min(inputs.photons.bounces() + 1), 1, 1);
     }
 }
 

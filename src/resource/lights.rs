@@ -123,23 +123,28 @@ impl Lights {
     }
 }
 
-/// Photons per light; sums to `total` if any light shines, and each light that shines gets at least one while the
-/// budget lasts.
+/// Photons per light; sums to `total` if any light shines. Each light that shines gets one before the rest is divided;
+/// with fewer photons than lights the last ones get none, and their light is missing.
 fn divide_photons(frame: &UnitFrame, lights: &[Light], total: u32) -> Vec<u32> {
     let region_radius = f64::from(frame.radius()) * frame.length_scale();
     let flux: Vec<f64> = lights.iter().map(|l| l.flux(region_radius).element_sum()).collect();
     let all: f64 = flux.iter().sum();
     let shining = flux.iter().filter(|&&f| f > 0.0).count() as f64;
+    let mut ones_left = total.min(shining as u32);
+    let rest = f64::from(total - ones_left);
     let mut share_so_far = 0.0;
     let mut given = 0;
     flux.iter()
         .map(|&f| {
+            let mut one = 0;
             if f > 0.0 {
                 share_so_far += (1.0 - EVEN_SHARE) * f / all + EVEN_SHARE / shining;
+                one = ones_left.min(1);
+                ones_left -= one;
             }
             // Rounding the running sum, not each share, makes the parts add up.
-            let until = (share_so_far * f64::from(total)).round().min(f64::from(total)) as u32;
-            let count = until - given;
+            let until = (share_so_far * rest).round().min(rest) as u32;
+            let count = one + until - given;
             given = until;
             count
         })
@@ -219,5 +224,9 @@ mod tests {
         assert_eq!(counts, [313, 687, 0]);
         assert_eq!(counts.iter().sum::<u32>(), 1000);
         assert_eq!(divide_photons(&frame(), &[light(0.0)], 1000), [0]);
+        let one_bright_among_many: Vec<_> = (0..64).map(|i| light(if i == 0 { 1e6 } else { 1.0 })).collect();
+        let counts = divide_photons(&frame(), &one_bright_among_many, 100);
+        assert!(counts.iter().all(|&c| c >= 1), "{counts:?}");
+        assert_eq!(counts.iter().sum::<u32>(), 100);
     }
 }

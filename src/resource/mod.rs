@@ -74,6 +74,7 @@ fn expect_view(
     let texture = view.texture();
     expect(resource, "format", texture.format(), formats)?;
     expect(resource, "sample count", texture.sample_count(), &[1])?;
+    expect(resource, "mip level count", texture.mip_level_count(), &[1])?;
     expect(
         resource,
         "dimension",

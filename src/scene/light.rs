@@ -132,7 +132,7 @@ impl Light {
         if !position.is_finite() {
             return error("position", format!("is {position}, not finite"));
         }
-        if !direction.is_finite() || direction.length() == 0.0 {
+        if !(direction.length() > 0.0 && direction.length().is_finite()) {
             return error("direction", format!("is {direction}; expected finite and not zero"));
         }
         if !(extent >= 0.0 && extent <= limit) {

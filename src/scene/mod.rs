@@ -79,26 +79,36 @@ impl Scene {
     pub fn triangle_count(&self) -> usize {
         self.instances
             .iter()
-            .map(|i| self.meshes[i.mesh].indices.len() / 3)
+            .filter_map(|i| self.meshes.get(i.mesh))
+            .map(|m| m.indices.len() / 3)
             .sum()
     }
 
     /// World-space bounds of all vertices that a triangle uses.
     ///
     /// # Errors
-    /// [`Error::InvalidBounds`] if there is no geometry or it has no extent.
+    /// [`Error::InvalidBounds`] if there is no geometry, it has no extent, or a vertex is not finite;
+    /// [`Error::InvalidScene`] for an instance or index that refers to nothing.
     pub fn bounds(&self) -> Result<SceneBounds, Error> {
         let (mut min, mut max) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for instance in &self.instances {
+        let mut is_finite = true;
+        for (index, instance) in self.instances.iter().enumerate() {
+            instance.validate(index, self.meshes.len(), self.materials.len())?;
             let mesh = &self.meshes[instance.mesh];
-            for &index in &mesh.indices {
-                let p = glam::Vec3::from(mesh.positions[index as usize]).as_dvec3();
-                let p = instance.transform.transform_point3(p);
+            for &vertex in &mesh.indices {
+                let Some(&position) = mesh.positions.get(vertex as usize) else {
+                    mesh.validate(instance.mesh)?;
+                    continue;
+                };
+                let p = instance
+                    .transform
+                    .transform_point3(glam::Vec3::from(position).as_dvec3());
+                is_finite &= p.is_finite();
                 min = min.min(p);
                 max = max.max(p);
             }
         }
-        SceneBounds::new(min, max)
+        SceneBounds::new(min, if is_finite { max } else { DVec3::NAN })
     }
 }
 

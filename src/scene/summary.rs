@@ -31,6 +31,31 @@ pub struct SceneSummary {
 }
 
 impl SceneSummary {
+    /// Checks the numbers, which a host may have filled in by hand, against the number of lights given with them.
+    ///
+    /// # Errors
+    /// [`Error::InvalidScene`]; [`Error::CountMismatch`] if `lights` is not `light_count`.
+    pub fn validate(&self, light_count: usize) -> Result<(), Error> {
+        let error = |field: &str, value: f64| {
+            let problem = format!("is {value}; expected finite and above zero");
+            Err(Error::scene("summary", "scene", field, problem))
+        };
+        if !(self.area > 0.0 && self.area.is_finite()) {
+            return error("area", self.area);
+        }
+        if !(self.total_flux >= 0.0 && self.total_flux.is_finite()) {
+            return error("total_flux", self.total_flux);
+        }
+        if self.lights != light_count {
+            return Err(Error::CountMismatch {
+                what: "lights beside a summary that counted them",
+                expected: self.lights,
+                found: light_count,
+            });
+        }
+        Ok(())
+    }
+
     /// Reads it off a scene.
     ///
     /// # Errors

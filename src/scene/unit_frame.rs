@@ -12,7 +12,7 @@ use glam::{DAffine3, DMat3, DVec3, Mat4, Vec3};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UnitFrame {
     center: DVec3,
-    /// Region radius in unit-frame lengths, in (1/2, 1].
+    /// Distance from the centre that the region reaches, in unit-frame lengths.
     radius: f64,
     /// One unit-frame length is 2^`length_exponent` world units.
     length_exponent: i32,
@@ -47,17 +47,30 @@ impl UnitFrame {
         })
     }
 
-    /// This frame, or a new one if the region has left it by a factor of two. A kept frame keeps history valid.
+    /// This frame, its radius brought up to date, or a new one if the region has left it by a factor of two. A kept
+    /// frame keeps history valid.
     ///
     /// # Errors
     /// As [`UnitFrame::new`].
     pub fn follow(&self, bounds: &SceneBounds, total_flux: f64) -> Result<Self, Error> {
         let fresh = Self::new(bounds, total_flux)?;
         let reach = (bounds.center() - self.center).length() + bounds.radius();
-        let world_radius = self.radius * exp2(self.length_exponent);
-        let lengths_fit = reach <= 2.0 * world_radius && bounds.radius() >= 0.5 * world_radius;
+        let lengths_fit = reach <= 2.0 * self.length_scale() && bounds.radius() >= 0.25 * self.length_scale();
         let flux_fits = (fresh.flux_exponent - self.flux_exponent).abs() <= 1;
-        Ok(if lengths_fit && flux_fits { *self } else { fresh })
+        if !(lengths_fit && flux_fits) {
+            return Ok(fresh);
+        }
+        Ok(Self {
+            radius: reach / self.length_scale(),
+            ..*self
+        })
+    }
+
+    /// Whether both frames map the world to the same numbers; then history made in one is good in the other.
+    pub fn maps_like(&self, other: &Self) -> bool {
+        self.center == other.center
+            && self.length_exponent == other.length_exponent
+            && self.flux_exponent == other.flux_exponent
     }
 
     /// World position of the frame's origin.
@@ -65,7 +78,8 @@ impl UnitFrame {
         self.center
     }
 
-    /// Radius of the region in unit-frame lengths, in (1/2, 1].
+    /// How far from the frame's origin the region reaches, in unit-frame lengths: in (1/2, 1] for a new frame, up to 2
+    /// while one is kept.
     pub fn radius(&self) -> f32 {
         self.radius as f32
     }
@@ -193,10 +207,18 @@ mod tests {
     #[test]
     fn a_frame_is_kept_until_the_region_leaves_it_by_two() {
         let frame = UnitFrame::new(&cube(1.0, DVec3::ZERO), 1.0).unwrap();
-        assert_eq!(frame.follow(&cube(1.2, DVec3::splat(0.1)), 1.5).unwrap(), frame);
-        assert_ne!(frame.follow(&cube(2.5, DVec3::ZERO), 1.0).unwrap(), frame);
-        assert_ne!(frame.follow(&cube(0.4, DVec3::ZERO), 1.0).unwrap(), frame);
-        assert_ne!(frame.follow(&cube(1.0, DVec3::ZERO), 64.0).unwrap(), frame);
+        let kept = |bounds: &SceneBounds, flux: f64| frame.follow(bounds, flux).unwrap().maps_like(&frame);
+        assert!(kept(&cube(1.0, DVec3::ZERO), 1.0));
+        assert!(kept(&cube(1.9, DVec3::splat(0.1)), 1.5));
+        assert!(!kept(&cube(2.5, DVec3::ZERO), 1.0));
+        assert!(!kept(&cube(0.25, DVec3::ZERO), 1.0));
+        assert!(!kept(&cube(1.0, DVec3::ZERO), 64.0));
+        let grown = frame.follow(&cube(1.9, DVec3::ZERO), 1.0).unwrap();
+        assert_eq!(
+            f64::from(grown.radius()),
+            (1.9 * 3f64.sqrt() / 2.0) as f32 as f64,
+            "the radius follows the region"
+        );
     }
 
     #[test]

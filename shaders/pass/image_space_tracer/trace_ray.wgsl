@@ -10,9 +10,12 @@ const TRACE_HIT: u32 = 1u;
 const TRACE_ESCAPED: u32 = 2u;
 const TRACE_LOST: u32 = 3u;
 
-// Rays are searched from here to there, unit frame: a thousandth of a region of radius 1, and a little over its diameter.
+// Rays are searched from here to there, unit frame: a thousandth of a region of radius 1, and a little over the diameter
+// of one that grew to a radius of 2 since the frame was made.
 const TRACE_NEAREST: f32 = 0x1p-10;
-const TRACE_FURTHEST: f32 = 2.5;
+const TRACE_FURTHEST: f32 = 5.0;
+// Where nothing is: further from any map's centre than any point of a ray.
+const TRACE_SKY: f32 = 16.0;
 // A hit may leave the texel whose plane it was computed from by this many texels.
 const TRACE_FOOTPRINT: f32 = 1.5;
 // A map sees the origin if it lies no further behind the texel's plane than this (unit frame) plus a quarter texel.
@@ -30,10 +33,10 @@ fn trace_nothing(kind: u32) -> Hit {
     return Hit(kind, TRACE_FURTHEST, vec3f(0.0), vec3f(0.0), vec3f(0.0));
 }
 
-// Distance of the map's surface in the direction of p; far away where there is none.
+// Distance of the map's surface in the direction of p; beyond all rays where there is none.
 fn trace_surface(map: u32, p: vec3f) -> f32 {
     let stored = env_map_distance(map, p, params.map_size);
-    return select(TRACE_FURTHEST, stored, stored > 0.0);
+    return select(TRACE_SKY, stored, stored > 0.0);
 }
 
 // Where the chord of the surface between an undershoot (t, w >= 1) and an overshoot (t, w < 1) meets the ray, with

@@ -1,8 +1,8 @@
 // Density estimation by tiles: photons are projected, binned to screen tiles, and each pixel gathers its tile's list.
 //
 // Lists fill in arrival order, so sums are taken in integers, which do not care: each contribution is rounded to a
-// multiple of 2^-30 of an upper bound of the tile's brightest contribution and added in 64 bits. Two lights of very
-// different power share a tile without loss, and the same frame gives the same bits.
+// multiple of 2^-30 of an upper bound of the tile's brightest contribution and added in 64 bits: each is off by at most
+// 2^-31 of the brightest in its tile, and the same frame gives the same bits.
 
 struct Params {
     bandwidth: Bandwidth,
@@ -64,6 +64,10 @@ fn projected_range(row: vec4f, w_row: vec4f, c: vec3f, h: f32) -> vec2f {
     let h2 = h * h;
     let qa = w * w - h2 * dot(w_row.xyz, w_row.xyz);
     let qb = a * w - h2 * dot(row.xyz, w_row.xyz);
+    if qa <= 0.0 {
+        // The ball holds the eye or reaches its plane: it may be seen anywhere.
+        return vec2f(-1e6, 1e6);
+    }
     let qc = a * a - h2 * dot(row.xyz, row.xyz);
     let root = sqrt(max(0.0, qb * qb - qa * qc));
     return vec2f(qb - root, qb + root) / qa;
