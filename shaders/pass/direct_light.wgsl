@@ -19,47 +19,30 @@ struct Params {
 const BIAS_TEXELS: f32 = 0.75;
 // And by this much in any case, unit frame: depth and distance are 24-bit numbers near 1.
 const BIAS: f32 = 0x1p-14;
-// Shadows cast from nearer than this many texel widths may be an edge's own: there the neighbours have a say.
-const NEIGHBOUR_TEXELS: f32 = 16.0;
 
-// How far a receiver lies behind the surface that a texel holds, along the ray; very far before where there is nothing.
-fn depth_behind(light: Light, ray: LightRay, texel_at: vec2u, distance: f32) -> f32 {
-    let texel = surface_texel_unpack(textureLoad(shadow_maps, texel_at, ray.layer, 0));
-    if texel.distance <= 0.0 {
-        return -1e30;
-    }
-    let texel_ray = light_texel_ray(light, ray, texel_at, params.shadow_map_size);
-    return distance - light_texel_distance(ray, texel_ray, texel);
-}
-
-fn is_lit(light: Light, p: vec3f) -> bool {
+// Whether light reaches the point p of a surface with normal n, which faces the light.
+fn is_lit(light: Light, p: vec3f, n: vec3f) -> bool {
     let ray = light_ray_to(light, p);
     if any(ray.uv < vec2f(0.0)) || any(ray.uv > vec2f(1.0)) {
         return true;
     }
     let size = params.shadow_map_size;
     let at = cube_face_texel(ray.uv, size);
-    let distance = dot(p - ray.origin, ray.direction);
-    let texel_width = 2.0 * light.half_extent / f32(size) * select(distance, 1.0, light.kind == LIGHT_DIRECTIONAL);
-    let bias = BIAS + BIAS_TEXELS * texel_width;
-    let behind = depth_behind(light, ray, at, distance);
-    if behind <= bias {
+    let texel = surface_texel_unpack(textureLoad(shadow_maps, at, ray.layer, 0));
+    if texel.distance <= 0.0 {
         return true;
     }
-    if behind > NEIGHBOUR_TEXELS * texel_width {
-        return false;
+    let distance = dot(p - ray.origin, ray.direction);
+    let texel_ray = light_texel_ray(light, ray, at, size);
+    let spread = select(distance, 1.0, light.kind == LIGHT_DIRECTIONAL);
+    let texel_width = 2.0 * light.half_extent / f32(size) * spread;
+    if distance <= light_texel_distance(ray, texel_ray, texel) + BIAS + BIAS_TEXELS * texel_width {
+        return true;
     }
-    // Just behind an edge: the texel's middle may see the other side of it, and a neighbour this side.
-    let aside = select(vec2i(-1), vec2i(1), fract(ray.uv * f32(size)) >= vec2f(0.5));
-    for (var i = 1; i < 4; i++) {
-        let neighbour = vec2i(at) + aside * vec2i(i & 1, i >> 1u);
-        if all(neighbour >= vec2i(0)) && all(neighbour < vec2i(i32(size))) {
-            if abs(depth_behind(light, ray, vec2u(neighbour), distance)) <= bias {
-                return true;
-            }
-        }
-    }
-    return false;
+    // All of the way to the light lies before the receiver's own plane, so nothing behind that plane is in the way: just
+    // past a convex edge the texel's middle may see the edge's other side.
+    let seen = texel_ray.origin + texel.distance * texel_ray.direction;
+    return dot(seen - p, n) <= 0.0;
 }
 
 // Irradiance that an unoccluded light gives a surface element.
@@ -92,7 +75,7 @@ fn light_pixels(@builtin(global_invocation_id) id: vec3u) {
     var sum = vec3f(0.0);
     for (var i = 0u; i < params.light_count; i++) {
         let e = unoccluded(lights[i], p, n);
-        if any(e > vec3f(0.0)) && is_lit(lights[i], p) {
+        if any(e > vec3f(0.0)) && is_lit(lights[i], p, n) {
             sum += e;
         }
     }

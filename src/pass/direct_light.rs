@@ -1,7 +1,7 @@
 //! Direct irradiance with hard shadows, deferred over the G-buffer.
 //!
 //! Inputs: [`GBuffer`], [`Lights`], [`ShadowMaps`]. Output: [`Irradiance`] (`rgba32float`). Cost: pixels × lights that
-//! face them, one texel fetch each, four close behind an edge. A receiver is lit where it lies no further than the plane of
+//! face them, one texel fetch each. A receiver is lit where it lies no further than the plane of
 //! the surface that its shadow-map texel holds, so flat surfaces need no bias. Source: deferred shading as in Yao et al. 2010, section 7.
 //! Limits: the extent of a light is ignored; geometry further than two unit-frame lengths (two to four region
 //! radii) towards a directional light does not shade.
