@@ -58,6 +58,7 @@ enum Method {
 /// Renders a scene with global illumination.
 #[derive(Parser)]
 #[command(
+    args_override_self = true,
     after_help = "Not available yet: --preset reference, --component caustic|specular, --tracer bvh|hybrid, \
     --method surface-lights|illumination-maps, --budget-ms, glTF skins."
 )]
