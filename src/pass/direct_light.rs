@@ -1,10 +1,11 @@
 //! Direct irradiance with hard shadows, deferred over the G-buffer.
 //!
 //! Inputs: [`GBuffer`], [`Lights`], [`ShadowMaps`]. Output: [`Irradiance`] (`rgba32float`). Cost: pixels × lights that
-//! face them, one texel fetch each. A receiver is lit where it lies no further than the plane of
-//! the surface that its shadow-map texel holds, so flat surfaces need no bias. Source: deferred shading as in Yao et al. 2010, section 7.
-//! Limits: the extent of a light is ignored; geometry further than two unit-frame lengths (two to four region
-//! radii) towards a directional light does not shade.
+//! face them, one texel fetch each. A receiver is lit where it lies no further than the plane of the surface that its
+//! shadow-map texel holds, so flat surfaces need no bias; and where that texel saw something behind the receiver's own
+//! plane, which cannot be in the way. Source: deferred shading as in Yao et al. 2010, section 7. Limits: the extent of a
+//! light is ignored; what lies outside the region is not shadowed from directional light, and geometry further than two
+//! unit-frame lengths towards such a light does not shade.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::{GBuffer, Irradiance, Lights, ShadowMaps};
