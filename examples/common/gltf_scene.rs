@@ -77,8 +77,11 @@ fn convert(bytes: &[u8], base_dir: Option<&Path>, time: f64) -> Result<Scene, St
     Ok(builder.scene)
 }
 
+/// The JSON of a file, and its binary chunk if it has one.
+type Chunks<'a> = (Cow<'a, [u8]>, Option<Cow<'a, [u8]>>);
+
 /// The JSON text and the binary chunk of a `.glb`; a `.gltf` is text as a whole.
-fn split(bytes: &[u8]) -> Result<(Cow<'_, [u8]>, Option<Cow<'_, [u8]>>), String> {
+fn split(bytes: &[u8]) -> Result<Chunks<'_>, String> {
     if bytes.is_empty() {
         return Err("the file is empty".into());
     }

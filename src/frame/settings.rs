@@ -24,17 +24,18 @@ pub struct Settings {
     pub bounces: u32,
     /// Environment maps, 1 to 42. More find more of what rays hit and cost six captures each.
     pub env_map_count: u32,
-    /// Texels along a face of an environment map. Finer resolves thinner things.
+    /// Texels along a face of an environment map. Finer resolves thinner things and costs memory and capture time as the
+    /// square.
     pub env_map_size: u32,
-    /// Texels along a layer of a shadow map.
+    /// Texels along a layer of a shadow map. Finer sharpens shadow edges, direct and in first hits; costs as the square.
     pub shadow_map_size: u32,
     /// Where environment maps are taken from.
     pub selector: EnvMapSelectorSettings,
-    /// How rays are traced.
+    /// How rays are traced: the default method has a quarter of the paper's error at twice its time.
     pub tracer: ImageSpaceTracerSettings,
-    /// How photons are drawn.
+    /// How photons are drawn: tiles in f32, or blended quads.
     pub splatter_config: PhotonSplatterConfig,
-    /// How wide.
+    /// How wide: more photons under a kernel are smoother, blurrier and darker at edges.
     pub splatter: PhotonSplatterSettings,
 }
 

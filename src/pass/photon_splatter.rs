@@ -174,6 +174,9 @@ pub struct PhotonSplatterSettings {
 }
 
 impl Default for PhotonSplatterSettings {
+    /// In one frame of a Cornell box, 150 photons a kernel halve the squared error that 60 leave, for twice the darkening
+    /// of edges; densities above the uniform one are clamped because that of a single hop says little of how crowded a
+    /// place is (clamping at 8 instead of 1 doubles the error). See `docs/accuracy.md`.
     fn default() -> Self {
         Self {
             bandwidth: Bandwidth::Density {

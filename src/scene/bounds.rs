@@ -19,7 +19,8 @@ impl SceneBounds {
     /// [`Error::InvalidBounds`] unless both corners are finite, ordered, and apart in at least one axis.
     pub fn new(min: DVec3, max: DVec3) -> Result<Self, Error> {
         let extent = max - min;
-        if !(min.is_finite() && max.is_finite()) || extent.min_element() < 0.0 || !(extent.length() > 0.0) {
+        let is_region = min.is_finite() && max.is_finite() && extent.min_element() >= 0.0 && extent.length() > 0.0;
+        if !is_region {
             return Err(Error::InvalidBounds {
                 min: min.into(),
                 max: max.into(),

@@ -41,7 +41,8 @@ impl Camera {
         if !self.transform.is_finite() {
             return error("transform", "is not finite");
         }
-        if !(self.transform.matrix3.determinant().abs() > 0.0) {
+        let determinant = self.transform.matrix3.determinant();
+        if determinant == 0.0 || !determinant.is_finite() {
             return error("transform", "is singular; give it three independent axes");
         }
         match self.projection {

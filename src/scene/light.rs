@@ -143,13 +143,12 @@ impl Light {
             outer_angle,
             ..
         } = self.kind
+            && !(inner_angle >= 0.0 && inner_angle <= outer_angle && outer_angle > 0.0 && outer_angle <= 0.5 * PI)
         {
-            if !(inner_angle >= 0.0 && inner_angle <= outer_angle && outer_angle > 0.0 && outer_angle <= 0.5 * PI) {
-                return error(
-                    "cone",
-                    format!("is {inner_angle} to {outer_angle}; expected 0 ≤ inner ≤ outer ≤ π/2, outer above 0"),
-                );
-            }
+            return error(
+                "cone",
+                format!("is {inner_angle} to {outer_angle}; expected 0 ≤ inner ≤ outer ≤ π/2, outer above 0"),
+            );
         }
         Ok(())
     }

@@ -5,7 +5,8 @@
 override kernel: u32 = 2u;
 
 const SPLAT_INVERSE_PI: f32 = 0.318309886;
-// Cosine of the largest angle between the photon's and the receiver's normal.
+// Cosine of the largest angle between the photon's and the receiver's normal: 45 degrees lets neighbouring facets share
+// light and keeps the walls of a corner apart.
 const SPLAT_NORMAL_AGREEMENT: f32 = 0.7;
 // The slab around the photon's plane that receives it, as a share of the bandwidth: admits gentle curvature.
 const SPLAT_SLAB: f32 = 0.25;
