@@ -15,7 +15,7 @@
 mod common;
 
 use clap::Parser;
-use common::{exr_file, truth_file};
+use common::{arguments, exr_file, truth_file};
 use lightfall::reference::metrics::{self, Comparison, Image, Truth};
 use serde_json::{Value, json};
 use std::io::Cursor;
@@ -43,17 +43,7 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    let arguments = match Arguments::try_parse() {
-        Ok(arguments) => arguments,
-        Err(error) if !error.use_stderr() => error.exit(),
-        Err(error) => {
-            // The first paragraph says what is wrong; usage follows.
-            let text = error.to_string();
-            let what: Vec<&str> = text.lines().take_while(|l| !l.is_empty()).map(str::trim).collect();
-            eprintln!("compare: {}", what.join(" ").trim_start_matches("error: "));
-            return ExitCode::from(2);
-        }
-    };
+    let arguments: Arguments = arguments::parse("compare");
     match run(&arguments) {
         Ok((line, is_finite)) => {
             println!("{line}");

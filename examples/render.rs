@@ -12,7 +12,7 @@ mod common;
 use clap::{Parser, ValueEnum};
 use common::adapter::{Gpu, Wishes};
 use common::offline::{Component, Offline};
-use common::{exr_file, gltf_scene, picture};
+use common::{arguments, exr_file, gltf_scene, picture};
 use lightfall::Timestamps;
 use lightfall::frame::{GiRenderer, Plan, Settings};
 use lightfall::scene::{Scene, SceneSummary, samples};
@@ -122,15 +122,7 @@ struct Arguments {
 }
 
 fn main() {
-    let arguments = Arguments::try_parse().unwrap_or_else(|error| {
-        if error.use_stderr() {
-            // The first paragraph says what is wrong; usage follows.
-            let text = error.to_string();
-            let what: Vec<&str> = text.lines().take_while(|l| !l.is_empty()).map(str::trim).collect();
-            fail(what.join(" ").trim_start_matches("error: "));
-        }
-        error.exit()
-    });
+    let arguments: Arguments = arguments::parse("render");
     if let Err(message) = run(&arguments) {
         fail(&message);
     }

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each example uses its own part of this")]
 
 pub(crate) mod adapter;
+pub(crate) mod arguments;
 pub(crate) mod exr_file;
 pub(crate) mod gltf_scene;
 pub(crate) mod offline;

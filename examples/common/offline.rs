@@ -27,6 +27,7 @@ pub(crate) struct Offline<'a> {
     pub(crate) view: ViewResources,
     accumulator: Option<(Accumulator, AccumulatorResources)>,
     scene: Scene,
+    summary: SceneSummary,
     camera: usize,
     size: [u32; 2],
     composite: CompositeSettings,
@@ -46,7 +47,8 @@ impl<'a> Offline<'a> {
         let (device, queue) = (&gpu.device, &gpu.queue);
         let mut geometry = MeshGeometry::new(device, queue, &scene)?;
         let mut renderer = GiRenderer::new(device, settings)?;
-        renderer.set_scene(queue, &SceneSummary::of(&scene)?, &scene.lights)?;
+        let summary = SceneSummary::of(&scene)?;
+        renderer.set_scene(queue, &summary, &scene.lights)?;
         renderer.place_env_maps_blocking(queue, &mut geometry)?;
         let weight = |on: bool| if on { 1.0 } else { 0.0 };
         let composite = CompositeSettings {
@@ -67,6 +69,7 @@ impl<'a> Offline<'a> {
             geometry,
             accumulator,
             scene,
+            summary,
             camera,
             size,
             composite,
@@ -77,9 +80,7 @@ impl<'a> Offline<'a> {
     /// Renders the next frame and waits for it.
     pub(crate) fn render_frame(&mut self, timestamps: Option<&Timestamps>) -> Result<(), Error> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
-        let frame = self
-            .renderer
-            .set_scene(queue, &SceneSummary::of(&self.scene)?, &self.scene.lights)?;
+        let frame = self.renderer.set_scene(queue, &self.summary, &self.scene.lights)?;
         self.composite.output_scale = frame.output_scale(1.0)?;
         let jitter = match self.accumulator {
             Some(_) => CameraView::jitter(self.frames),
@@ -135,6 +136,7 @@ impl<'a> Offline<'a> {
         for (index, instance) in scene.instances.iter().enumerate() {
             self.geometry.set_transform(index, instance.transform)?;
         }
+        self.summary = SceneSummary::of(&scene)?;
         self.scene = scene;
         self.frames = 0;
         if let Some((_, resources)) = &mut self.accumulator {

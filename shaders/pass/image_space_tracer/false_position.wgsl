@@ -12,8 +12,7 @@ fn false_position_search(map: u32, x: vec3f, r: vec3f) -> f32 {
     var under = vec2f(0.0);
     var over = vec2f(0.0);
     for (var i = 0u; i < params.iterations; i++) {
-        let p = x + t * r;
-        let w = trace_surface(map, p) / max(length(p), 1e-9);
+        let w = trace_ratio(map, x + t * r);
         if w >= 1.0 {
             under = vec2f(t, w);
         } else {

@@ -27,8 +27,7 @@ fn march_refine(map: u32, x: vec3f, r: vec3f, front: vec2f, behind: vec2f) -> Hi
     var over = behind;
     var t = trace_chord(under, over);
     for (var i = 0u; i < MARCH_REFINEMENTS; i++) {
-        let p = x + t * r;
-        let w = trace_surface(map, p) / max(length(p), 1e-9);
+        let w = trace_ratio(map, x + t * r);
         if w >= 1.0 {
             under = vec2f(t, w);
         } else {
@@ -67,8 +66,7 @@ fn march_map(map: u32, x: vec3f, r: vec3f, start: f32, starts_in_front: bool) ->
         // tan(a + b) from tan a and tan b.
         tangent = (tangent + step_tan) / (1.0 - tangent * step_tan);
         let t = select(closest + aside * tangent, TRACE_FURTHEST, i == steps);
-        let p = x + t * r;
-        let w = trace_surface(map, p) / max(length(p), 1e-9);
+        let w = trace_ratio(map, x + t * r);
         if in_front && w < 1.0 {
             let hit = march_refine(map, x, r, previous, vec2f(t, w));
             if hit.kind == TRACE_HIT {

@@ -39,8 +39,13 @@ fn trace_surface(map: u32, p: vec3f) -> f32 {
     return select(TRACE_SKY, stored, stored > 0.0);
 }
 
-// Where the chord of the surface between an undershoot (t, w >= 1) and an overshoot (t, w < 1) meets the ray, with
-// w = surface distance over point distance: t = t1 (1 - b) + t2 b, b = w2 (w1 - 1) / (w1 - w2), because a point
+// Surface distance over point distance in the direction of p: at least 1 in front of the surface, less behind it.
+fn trace_ratio(map: u32, p: vec3f) -> f32 {
+    return trace_surface(map, p) / max(length(p), 1e-9);
+}
+
+// Where the chord of the surface between an undershoot (t, w >= 1) and an overshoot (t, w < 1) meets the ray, w as
+// trace_ratio gives it: t = t1 (1 - b) + t2 b, b = w2 (w1 - 1) / (w1 - w2), because a point
 // (1 - u) w1 p1 + u w2 p2 lies on the line p1 p2 where its weights sum to 1.
 fn trace_chord(under: vec2f, over: vec2f) -> f32 {
     let b = over.y * (under.y - 1.0) / (under.y - over.y);
