@@ -21,8 +21,8 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Frames timed when there is nothing to accumulate.
-const TIMED_FRAMES: u32 = 3;
+/// Frames timed when there is nothing to accumulate: a whole round of the selection of places for environment maps.
+const TIMED_FRAMES: u32 = 5;
 
 #[derive(Clone, Copy, ValueEnum)]
 enum Part {
@@ -63,7 +63,7 @@ enum Method {
     --method surface-lights|illumination-maps, --budget-ms, glTF skins."
 )]
 struct Arguments {
-    /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, plane, furnace, two-rooms)
+    /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, plane, furnace, two-rooms, pillars)
     scene: String,
     /// Width in pixels
     #[arg(long, default_value_t = 512)]
@@ -324,7 +324,7 @@ fn progress(length: u64) -> indicatif::ProgressBar {
     }
 }
 
-/// Times of frames and stages.
+/// Times of frames and stages. A stage that runs in some frames only counts for its share.
 struct Clock {
     setup_ms: f64,
     on_gpu: bool,
@@ -397,7 +397,10 @@ fn report(gpu: &Gpu, offline: &Offline<'_>, settings: &Settings, clock: &Clock) 
     let stages: Vec<Value> = clock
         .stages
         .iter()
-        .map(|(name, all)| json!({"name": name.trim_start_matches("lightfall::"), "ms": median(all)}))
+        .map(|(name, all)| {
+            let share = all.len() as f64 / clock.frames_ms.len().max(1) as f64;
+            json!({"name": name.trim_start_matches("lightfall::"), "ms": median(all) * share})
+        })
         .collect();
     Ok(json!({
         "adapter": {
@@ -422,7 +425,7 @@ fn report(gpu: &Gpu, offline: &Offline<'_>, settings: &Settings, clock: &Clock) 
         "env_maps": {
             "candidates": settings.selector.candidates,
             "used": offline.renderer.env_maps().map_or(0, |m| m.centers().len()),
-            "coverage": null,
+            "coverage": offline.renderer.env_map_coverage(),
         },
         "bytes": {
             "total": by_resource.iter().map(|r| r.1).sum::<u64>(),

@@ -4,7 +4,8 @@
 use crate::Error;
 use std::cell::Cell;
 
-/// What this thread has created so far. Tests compare two readings: nothing may be created on a settled frame path.
+/// What this thread has created, recorded and waited for so far. Tests compare two readings: nothing may be created or
+/// waited for on a settled frame path.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct CreationCount {
     /// Textures.
@@ -19,17 +20,24 @@ pub struct CreationCount {
     pub bytes: u64,
     /// Render and compute passes begun.
     pub passes: u64,
+    /// Times the thread waited for the GPU.
+    pub waits: u64,
 }
 
 thread_local! {
     static CREATED: Cell<CreationCount> = const { Cell::new(CreationCount {
-        textures: 0, buffers: 0, bind_groups: 0, pipelines: 0, bytes: 0, passes: 0,
+        textures: 0, buffers: 0, bind_groups: 0, pipelines: 0, bytes: 0, passes: 0, waits: 0,
     }) };
 }
 
 /// What the crate has created on this thread so far.
 pub fn creation_count() -> CreationCount {
     CREATED.get()
+}
+
+/// Notes that the thread waits for the GPU.
+pub(crate) fn count_wait() {
+    count(|c| c.waits += 1);
 }
 
 fn count(update: impl FnOnce(&mut CreationCount)) {
@@ -181,6 +189,8 @@ pub(crate) enum Slot {
     Texture,
     /// `texture_2d<f32>` for filtering.
     FilteredTexture,
+    /// `texture_2d<u32>`.
+    UintTexture,
     /// `texture_2d_array<u32>`.
     UintArray,
     /// `texture_storage_2d<.., write>`.
@@ -219,6 +229,7 @@ pub(crate) fn layout(
                 Slot::StorageMut => buffer(wgpu::BufferBindingType::Storage { read_only: false }, None),
                 Slot::Texture => texture(wgpu::TextureSampleType::Float { filterable: false }, flat),
                 Slot::FilteredTexture => texture(wgpu::TextureSampleType::Float { filterable: true }, flat),
+                Slot::UintTexture => texture(wgpu::TextureSampleType::Uint, flat),
                 Slot::UintArray => texture(wgpu::TextureSampleType::Uint, array),
                 Slot::StorageTexture(format) => wgpu::BindingType::StorageTexture {
                     access: wgpu::StorageTextureAccess::WriteOnly,
@@ -427,6 +438,30 @@ pub(crate) fn render_pass<'a>(
     depth: Option<&wgpu::TextureView>,
     timestamps: Option<&crate::Timestamps>,
 ) -> wgpu::RenderPass<'a> {
+    let load = wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT);
+    let depth = depth.map(|d| (d, wgpu::LoadOp::Clear(0.0)));
+    begin_render_pass(encoder, label, (colors, load), depth, timestamps)
+}
+
+/// A render pass that draws over what its targets hold.
+pub(crate) fn render_pass_over<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    label: &'static str,
+    colors: &[&wgpu::TextureView],
+    depth: Option<&wgpu::TextureView>,
+    timestamps: Option<&crate::Timestamps>,
+) -> wgpu::RenderPass<'a> {
+    let depth = depth.map(|d| (d, wgpu::LoadOp::Load));
+    begin_render_pass(encoder, label, (colors, wgpu::LoadOp::Load), depth, timestamps)
+}
+
+fn begin_render_pass<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    label: &'static str,
+    (colors, load_color): (&[&wgpu::TextureView], wgpu::LoadOp<wgpu::Color>),
+    depth: Option<(&wgpu::TextureView, wgpu::LoadOp<f32>)>,
+    timestamps: Option<&crate::Timestamps>,
+) -> wgpu::RenderPass<'a> {
     count(|c| c.passes += 1);
     let span = timestamps.and_then(|t| t.span(label));
     let attachments: Vec<_> = colors
@@ -437,16 +472,16 @@ pub(crate) fn render_pass<'a>(
                 depth_slice: None,
                 resolve_target: None,
                 ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
+                    load: load_color,
                     store: wgpu::StoreOp::Store,
                 },
             })
         })
         .collect();
-    let depth = depth.map(|view| wgpu::RenderPassDepthStencilAttachment {
+    let depth = depth.map(|(view, load)| wgpu::RenderPassDepthStencilAttachment {
         view,
         depth_ops: Some(wgpu::Operations {
-            load: wgpu::LoadOp::Clear(0.0),
+            load,
             store: wgpu::StoreOp::Store,
         }),
         stencil_ops: None,

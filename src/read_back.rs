@@ -1,6 +1,114 @@
-//! Reading results back for headless use. Every function here blocks, and none is called on the frame path.
+//! Reading results back: asynchronously on the frame path ([`ReadBackRing`]), and by waiting, for headless use, in the
+//! functions that say so in their names.
 
 use crate::{Error, gpu};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Results that may be on their way at once: two frames in flight and one being read.
+const RING: usize = 3;
+
+/// Copies of a small buffer that come back a frame or two later, without a wait: the transfer is recorded with the frame,
+/// and the host's own submitting or polling delivers it.
+#[derive(Debug)]
+pub(crate) struct ReadBackRing {
+    slots: [RingSlot; RING],
+    /// Transfers recorded so far; orders them.
+    recorded: u64,
+    size: u64,
+}
+
+#[derive(Debug)]
+struct RingSlot {
+    buffer: wgpu::Buffer,
+    state: Arc<AtomicU32>,
+    order: u64,
+}
+
+/// States of a slot.
+const FREE: u32 = 0;
+const IN_FLIGHT: u32 = 1;
+const READY: u32 = 2;
+
+/// Frees its slot if the submission it waits for is dropped or fails.
+struct Delivery(Arc<AtomicU32>);
+
+impl Delivery {
+    fn arrive(self, result: Result<(), wgpu::BufferAsyncError>) {
+        if result.is_ok() {
+            self.0.store(READY, Ordering::Release);
+        }
+    }
+}
+
+impl Drop for Delivery {
+    fn drop(&mut self) {
+        // Nothing to do where it has arrived.
+        let _ = self
+            .0
+            .compare_exchange(IN_FLIGHT, FREE, Ordering::AcqRel, Ordering::Acquire);
+    }
+}
+
+impl ReadBackRing {
+    /// Bytes of a ring for results of `size` bytes.
+    pub(crate) fn size_in_bytes(size: u64) -> u64 {
+        RING as u64 * size
+    }
+
+    /// For results of `size` bytes.
+    pub(crate) fn new(device: &wgpu::Device, label: &'static str, size: u64) -> Result<Self, Error> {
+        let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+        let slot = || {
+            Ok(RingSlot {
+                buffer: gpu::buffer(device, label, size, usage)?,
+                state: Arc::new(AtomicU32::new(FREE)),
+                order: 0,
+            })
+        };
+        Ok(Self {
+            slots: [slot()?, slot()?, slot()?],
+            recorded: 0,
+            size,
+        })
+    }
+
+    /// Records the transfer of `source`'s first bytes. While all slots are under way the result is not fetched: a later
+    /// one will be.
+    pub(crate) fn record(&mut self, encoder: &mut wgpu::CommandEncoder, source: &wgpu::Buffer) {
+        let Some(slot) = self.slots.iter_mut().find(|s| s.state.load(Ordering::Acquire) == FREE) else {
+            return;
+        };
+        self.recorded += 1;
+        slot.order = self.recorded;
+        slot.state.store(IN_FLIGHT, Ordering::Release);
+        encoder.copy_buffer_to_buffer(source, 0, &slot.buffer, 0, self.size);
+        let delivery = Delivery(slot.state.clone());
+        encoder.map_buffer_on_submit(&slot.buffer, wgpu::MapMode::Read, .., move |result| {
+            delivery.arrive(result)
+        });
+    }
+
+    /// The latest result that has arrived; older ones are let go.
+    pub(crate) fn take<T: bytemuck::AnyBitPattern>(&mut self) -> Option<T> {
+        let mut latest = None;
+        let mut newest = 0;
+        for slot in &self.slots {
+            if slot.state.load(Ordering::Acquire) != READY {
+                continue;
+            }
+            if slot.order > newest
+                && let Ok(mapped) = slot.buffer.slice(..).get_mapped_range()
+            {
+                latest = bytemuck::try_pod_read_unaligned(&mapped[..size_of::<T>()]).ok();
+                newest = slot.order;
+            }
+            slot.buffer.unmap();
+            slot.state.store(FREE, Ordering::Release);
+        }
+        latest
+    }
+}
 
 /// Waits until `buffer` (MAP_READ) can be mapped and copies its contents out.
 pub(crate) fn map_blocking<T: bytemuck::Pod>(
@@ -9,6 +117,7 @@ pub(crate) fn map_blocking<T: bytemuck::Pod>(
     what: &'static str,
 ) -> Result<Vec<T>, Error> {
     let error = |reason: String| Error::ReadBack { what, reason };
+    gpu::count_wait();
     let (sender, receiver) = std::sync::mpsc::channel();
     buffer.slice(..).map_async(wgpu::MapMode::Read, move |result| {
         // The receiver lives until this function returns.

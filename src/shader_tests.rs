@@ -42,6 +42,7 @@ impl Shader {
     fn scalar(&self, ty: Handle<Type>) -> Option<ScalarKind> {
         match self.module.types[ty].inner {
             TypeInner::Atomic(scalar) => Some(scalar.kind),
+            TypeInner::Array { base, .. } => self.scalar(base),
             ref inner => inner.scalar_kind(),
         }
     }
@@ -244,9 +245,14 @@ fn twins() -> Vec<Twin> {
         }),
         twin!(wgsl::ACCUMULATOR, "Params", accumulator::gpu::Params { history_weight, mean_weight }),
         twin!(wgsl::TONE_MAP, "Params", tone_map::gpu::Params { exposure, curve, inverse_gamma }),
-        twin!(wgsl::ENV_MAP_SELECTOR, "Params", env_map_selector::gpu::Params { map_size }),
+        twin!(wgsl::ENV_MAP_SELECTOR, "Params", env_map_selector::gpu::Params {
+            candidate_count, columns, limit, tag, back_face_limit, clearance, tolerance, coverage_target,
+        }),
         twin!(wgsl::ENV_MAP_SELECTOR, "Sight", env_map_selector::gpu::SightRecord {
-            texels, surfaces, back_faces, nearest,
+            surfaces, back_faces, nearest, is_valid, area, unseen, own, seldom_seen,
+        }),
+        twin!(wgsl::ENV_MAP_SELECTOR, "Selection", env_map_selector::gpu::SelectionRecord {
+            tag, selected, newest, is_done, is_stable, swaps, coverage, pad, chosen,
         }),
         twin!(wgsl::TRACE_STATISTICS, "Params", trace_statistics::gpu::Params { photon_count }),
         twin!(wgsl::TRACE_STATISTICS, "Sums", trace_statistics::gpu::Sums { stored, absorbed, escaped, lost }),
@@ -351,7 +357,8 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "Composite" => vec![&composite::SLOTS],
         "Accumulator" => vec![&accumulator::SLOTS],
         "ToneMap" => vec![&tone_map::SLOTS],
-        "EnvMapSelector" => vec![&env_map_selector::SLOTS],
+        "EnvMapSelector" => vec![&env_map_selector::SLOTS, &env_map_selector::SWITCH_SLOTS],
+        "EnvMapSelector clear" => vec![],
         "TraceStatistics" => vec![&trace_statistics::SLOTS],
         _ => panic!("which layouts has {module}?"),
     }
@@ -364,6 +371,7 @@ fn kind_of_slot(slot: Slot) -> String {
         Slot::Storage => "var<storage, read>".into(),
         Slot::StorageMut => "var<storage, read_write>".into(),
         Slot::Texture | Slot::FilteredTexture => "texture_2d<f32>".into(),
+        Slot::UintTexture => "texture_2d<u32>".into(),
         Slot::UintArray => "texture_2d_array<u32>".into(),
         Slot::StorageTexture(format) => format!("texture_storage_2d<{format:?}, write>"),
         Slot::Sampler => "sampler".into(),
@@ -393,6 +401,13 @@ fn kind_of_variable(space: AddressSpace, ty: &TypeInner) -> String {
                     multi: false,
                 },
             ) => "texture_2d<f32>".into(),
+            (
+                false,
+                ImageClass::Sampled {
+                    kind: ScalarKind::Uint,
+                    multi: false,
+                },
+            ) => "texture_2d<u32>".into(),
             (
                 true,
                 ImageClass::Sampled {
@@ -450,7 +465,12 @@ fn every_layout_stays_within_default_limits() {
         at_most(
             limits.max_sampled_textures_per_shader_stage,
             "sampled textures",
-            |slot| matches!(slot, Slot::Texture | Slot::FilteredTexture | Slot::UintArray),
+            |slot| {
+                matches!(
+                    slot,
+                    Slot::Texture | Slot::FilteredTexture | Slot::UintTexture | Slot::UintArray
+                )
+            },
         );
         at_most(
             limits.max_storage_textures_per_shader_stage,

@@ -99,13 +99,16 @@ pub(crate) const ACCUMULATOR: &str = compose!["pass/accumulator.wgsl", "common/f
 pub(crate) const TONE_MAP: &str = compose!["pass/tone_map.wgsl", "common/full_screen.wgsl"];
 
 pub(crate) const ENV_MAP_SELECTOR: &str = compose![
-    "pass/env_map_selector.wgsl",
-    "common/env_map.wgsl",
+    "pass/env_map_selector/select_maps.wgsl",
+    "pass/env_map_selector/candidate.wgsl",
     "common/surface_texel.wgsl",
     "common/octahedral.wgsl",
     "common/reflectance.wgsl",
     "common/cube_face.wgsl",
 ];
+
+pub(crate) const ENV_MAP_SELECTOR_CLEAR: &str =
+    compose!["pass/env_map_selector/clear_tile.wgsl", "common/full_screen.wgsl"];
 
 pub(crate) const TRACE_STATISTICS: &str = compose![
     "pass/trace_statistics.wgsl",
@@ -116,7 +119,7 @@ pub(crate) const TRACE_STATISTICS: &str = compose![
 
 /// Every composed module, by the name of its pass; for validation and for tools.
 #[doc(hidden)]
-pub const MODULES: [(&str, &str); 11] = [
+pub const MODULES: [(&str, &str); 12] = [
     ("MeshGeometry", MESH_GEOMETRY),
     ("PhotonEmitter", PHOTON_EMITTER),
     ("ImageSpaceTracer", IMAGE_SPACE_TRACER),
@@ -127,6 +130,7 @@ pub const MODULES: [(&str, &str); 11] = [
     ("Accumulator", ACCUMULATOR),
     ("ToneMap", TONE_MAP),
     ("EnvMapSelector", ENV_MAP_SELECTOR),
+    ("EnvMapSelector clear", ENV_MAP_SELECTOR_CLEAR),
     ("TraceStatistics", TRACE_STATISTICS),
 ];
 

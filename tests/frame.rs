@@ -20,6 +20,15 @@ fn small() -> Settings {
     }
 }
 
+/// A renderer whose environment maps have their places.
+fn placed(gpu: &Gpu, settings: &Settings, scene: &Scene, geometry: &mut MeshGeometry) -> GiRenderer {
+    let mut renderer = GiRenderer::new(&gpu.device, settings).unwrap();
+    let summary = SceneSummary::of(scene).unwrap();
+    renderer.set_scene(&gpu.queue, &summary, &scene.lights).unwrap();
+    renderer.place_env_maps_blocking(&gpu.queue, geometry).unwrap();
+    renderer
+}
+
 /// One frame recorded by the renderer, not submitted.
 fn record(
     renderer: &mut GiRenderer,
@@ -258,7 +267,7 @@ fn the_renderer_equals_the_passes_composed_by_hand_bit_for_bit() {
     let Some(gpu) = gpu() else { return };
     let (scene, settings, size) = (samples::cornell(0.4), small(), [40, 30]);
     let mut geometry = MeshGeometry::new(&gpu.device, &gpu.queue, &scene).unwrap();
-    let mut renderer = GiRenderer::new(&gpu.device, &settings).unwrap();
+    let mut renderer = placed(&gpu, &settings, &scene, &mut geometry);
     let mut view = renderer.new_view(size).unwrap();
     let encoder = record(
         &mut renderer,
@@ -453,7 +462,7 @@ fn two_views_of_one_scene_share_its_photons() {
     let (device, queue) = (&gpu.device, &gpu.queue);
     let scene = samples::cornell(0.0);
     let mut geometry = MeshGeometry::new(device, queue, &scene).unwrap();
-    let mut renderer = GiRenderer::new(device, &small()).unwrap();
+    let mut renderer = placed(&gpu, &small(), &scene, &mut geometry);
     let summary = SceneSummary::of(&scene).unwrap();
     let frame = renderer.set_scene(queue, &summary, &scene.lights).unwrap();
     let sizes = [[32, 32], [24, 16]];
@@ -497,15 +506,12 @@ fn a_view_made_for_other_settings_is_made_anew() {
     let scene = samples::cornell(0.0);
     let device = (&gpu.device, &gpu.queue);
     let mut geometry = MeshGeometry::new(device.0, device.1, &scene).unwrap();
-    let mut few = GiRenderer::new(
-        device.0,
-        &Settings {
-            photons: 500,
-            ..small()
-        },
-    )
-    .unwrap();
-    let mut many = GiRenderer::new(device.0, &small()).unwrap();
+    let fewer = Settings {
+        photons: 500,
+        ..small()
+    };
+    let mut few = placed(&gpu, &fewer, &scene, &mut geometry);
+    let mut many = placed(&gpu, &small(), &scene, &mut geometry);
     let mut reused = few.new_view([24, 24]).unwrap();
     let mut own = many.new_view([24, 24]).unwrap();
     let mut show = |renderer: &mut GiRenderer, view: &mut ViewResources| {

@@ -77,10 +77,11 @@ impl<'a> Offline<'a> {
         })
     }
 
-    /// Renders the next frame and waits for it.
+    /// Renders the next frame, as of a scene in motion, and waits for it.
     pub(crate) fn render_frame(&mut self, timestamps: Option<&Timestamps>) -> Result<(), Error> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let frame = self.renderer.set_scene(queue, &self.summary, &self.scene.lights)?;
+        self.renderer.geometry_changed();
         self.composite.output_scale = frame.output_scale(1.0)?;
         let jitter = match self.accumulator {
             Some(_) => CameraView::jitter(self.frames),

@@ -4,22 +4,22 @@
 //! [`GiRenderer::record_scene`] once, [`GiRenderer::record_view`] for each view; then the host submits. Nothing is read
 //! back, submitted or, once settled, allocated on the way.
 
+use super::env_map_placement::{EnvMapPlacement, PlacementInputs, SelectionContext, Work};
 use super::{Plan, Settings, Stage};
 use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, DirectLight, DirectLightInputs,
-    DirectLightResources, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapSelector,
-    EnvMapSelectorInputs, EnvMapSelectorResources, GBufferCapture, GBufferCaptureInputs, ImageSpaceTracer,
-    ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources,
-    PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, ShadowMapCapture, ShadowMapCaptureInputs,
-    ShadowMapCaptureResources,
+    DirectLightResources, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapSelector, GBufferCapture,
+    GBufferCaptureInputs, ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitter,
+    PhotonEmitterInputs, PhotonEmitterResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources,
+    ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources,
 };
 use crate::resource::{
     CameraView, CapturePurpose, CaptureView, EnvMaps, GBuffer, Geometry, Irradiance, Lights, Photons, PrepareContext,
     Radiance, ShadowMaps,
 };
-use crate::scene::{Light, SceneSummary, UnitFrame};
+use crate::scene::{Light, SceneBounds, SceneSummary, UnitFrame};
 use crate::{Error, Timestamps};
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// All passes and the resources that views share.
@@ -32,14 +32,15 @@ pub struct GiRenderer {
     direct: Option<DirectScene>,
     indirect: Option<IndirectScene>,
     state: Option<SceneState>,
-    /// Where environment maps were placed, world space; they outlive the maps.
-    centers: Option<Vec<DVec3>>,
+    placement: EnvMapPlacement,
     /// Changes whenever a resource that views bind is made anew; no two renderers share one.
     generation: u64,
     /// All views of the frame, indexed; the last `prepare` filled it.
     views: Vec<CaptureView>,
     light_views: std::ops::Range<usize>,
     env_map_views: std::ops::Range<usize>,
+    /// This frame's share of the selection, and its views.
+    selection: Option<(Work, std::ops::Range<usize>)>,
 }
 
 #[derive(Debug)]
@@ -47,6 +48,7 @@ struct Passes {
     g_buffer_capture: GBufferCapture,
     shadow_map_capture: ShadowMapCapture,
     direct_light: DirectLight,
+    env_map_selector: EnvMapSelector,
     env_map_capture: EnvMapCapture,
     photon_emitter: PhotonEmitter,
     image_space_tracer: ImageSpaceTracer,
@@ -60,9 +62,8 @@ struct SceneState {
     frame: UnitFrame,
     plan: Plan,
     lights: Vec<Light>,
-    /// Corners of the region and its area, unit frame.
-    min: Vec3,
-    max: Vec3,
+    region: SceneBounds,
+    /// Of all surfaces, unit frame.
     area: f32,
 }
 
@@ -150,6 +151,7 @@ impl GiRenderer {
             g_buffer_capture: GBufferCapture::new(),
             shadow_map_capture: ShadowMapCapture::new(),
             direct_light: DirectLight::new(device),
+            env_map_selector: EnvMapSelector::new(device),
             env_map_capture: EnvMapCapture::new(),
             photon_emitter: PhotonEmitter::new(device),
             image_space_tracer: ImageSpaceTracer::new(device),
@@ -164,11 +166,12 @@ impl GiRenderer {
             direct: None,
             indirect: None,
             state: None,
-            centers: None,
+            placement: EnvMapPlacement::default(),
             generation: next_generation(),
             views: Vec::new(),
             light_views: 0..0,
             env_map_views: 0..0,
+            selection: None,
         })
     }
 
@@ -198,12 +201,15 @@ impl GiRenderer {
             frame,
             plan,
             lights: lights.to_vec(),
-            min: frame.point(summary.bounds.min),
-            max: frame.point(summary.bounds.max),
+            region: summary.bounds,
             area: (summary.area / (length * length)) as f32,
         });
         if let Some(direct) = &mut self.direct {
             direct.lights.write(queue, &frame, lights, self.settings.photons)?;
+        }
+        if let Some(state) = &self.state {
+            let context = selection_context(&self.device, queue, &self.settings, state);
+            self.placement.follow(&context, self.indirect.is_some())?;
         }
         self.apply_centers(queue)?;
         Ok(frame)
@@ -245,21 +251,18 @@ impl GiRenderer {
         Ok(())
     }
 
-    /// Writes the centres of the environment maps in the current frame: where they were placed, or the first candidates.
+    /// Writes the centres of the environment maps in the current frame.
     fn apply_centers(&mut self, queue: &wgpu::Queue) -> Result<(), Error> {
         let (Some(state), Some(indirect)) = (&self.state, &mut self.indirect) else {
             return Ok(());
         };
-        let centers = match &self.centers {
-            Some(world) => world.iter().map(|&c| state.frame.point(c)).collect(),
-            None => EnvMapSelector::candidates(state.min, state.max, self.settings.env_map_count),
-        };
-        indirect.env_maps.set_centers(queue, &centers)
+        let context = selection_context(&self.device, queue, &self.settings, state);
+        indirect.env_maps.set_centers(queue, &self.placement.centers(&context))
     }
 
-    /// Tries the candidates and places the environment maps at the first valid ones. Submits and waits: for headless use
-    /// and loading screens. Until it is called, maps stand at the first candidates, valid or not. It prepares the geometry
-    /// for views of its own: call it after `set_scene` and before `prepare`.
+    /// Selects places for the environment maps. Submits and waits: for headless use and loading screens. Without it the
+    /// selection begins with the first frame and arrives some frames later. It prepares the geometry for views of its own:
+    /// call it after `set_scene` and before `prepare`.
     ///
     /// # Errors
     /// [`Error::ReadBack`], [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
@@ -267,38 +270,14 @@ impl GiRenderer {
         let Some(state) = &self.state else {
             return Ok(());
         };
-        let settings = &self.settings.selector;
-        let count = settings.candidates.max(self.settings.env_map_count);
-        let candidates = EnvMapSelector::candidates(state.min, state.max, count);
-        let selector = EnvMapSelector::new(&self.device);
-        let mut resources = EnvMapSelectorResources::new(&self.device, count)?;
-        resources.env_maps().set_centers(queue, &candidates)?;
-        let mut views: Vec<CaptureView> = resources.env_maps().views(CapturePurpose::Candidate).collect();
-        number(&mut views);
-        let context = PrepareContext {
-            device: &self.device,
-            queue,
-            frame: &state.frame,
-        };
-        geometry.prepare(&context, &views)?;
-        let mut encoder = self.device.create_command_encoder(&Default::default());
-        let inputs = EnvMapSelectorInputs {
-            queue,
-            geometry,
-            views: &views,
-            timestamps: None,
-        };
-        selector.record(&mut encoder, &mut resources, &inputs);
-        queue.submit([encoder.finish()]);
-        let sights = resources.read_blocking(&self.device, queue)?;
-        let radius = state.frame.radius();
-        let chosen = EnvMapSelector::choose(&sights, settings, radius, self.settings.env_map_count as usize);
-        let world = chosen.into_iter().map(|i| state.frame.world_point(candidates[i]));
-        self.centers = Some(world.collect());
+        let context = selection_context(&self.device, queue, &self.settings, state);
+        self.placement
+            .select_blocking(&self.passes.env_map_selector, &context, geometry)?;
         self.apply_centers(queue)
     }
 
-    /// Places the environment maps by hand, world space; up to [`Settings::env_map_count`].
+    /// Places the environment maps by hand, world space; up to [`Settings::env_map_count`]. Nothing is selected any more,
+    /// until `place_env_maps_blocking` is called.
     ///
     /// # Errors
     /// [`Error::CountMismatch`] for too many.
@@ -311,8 +290,18 @@ impl GiRenderer {
                 found: centers.len(),
             });
         }
-        self.centers = Some(centers.to_vec());
+        self.placement.set_centers(centers);
+        if let Some(indirect) = &mut self.indirect {
+            indirect.env_maps.forget_centers();
+        }
         self.apply_centers(queue)
+    }
+
+    /// Says that geometry has moved, appeared or gone since the last frame: the selection of places for environment maps
+    /// is then kept up to date until it comes to rest. Maps themselves are captured every frame in any case. Call it before
+    /// `prepare`; a change of the region is noticed without it.
+    pub fn geometry_changed(&mut self) {
+        self.placement.geometry_changed();
     }
 
     /// Collects every view of the frame, numbers them, and lets the geometry prepare for them.
@@ -325,6 +314,12 @@ impl GiRenderer {
         geometry: &mut dyn Geometry,
         cameras: &mut [CameraView],
     ) -> Result<(), Error> {
+        let Some(frame) = self.state.as_ref().map(|s| s.frame) else {
+            return Ok(());
+        };
+        if self.placement.take_selection(&frame) {
+            self.apply_centers(queue)?;
+        }
         let Some(state) = &self.state else {
             return Ok(());
         };
@@ -338,12 +333,17 @@ impl GiRenderer {
         if let Some(indirect) = &self.indirect {
             self.views.extend(indirect.env_maps.views(CapturePurpose::EnvMap));
         }
+        let selection_from = self.views.len();
+        let work = self
+            .placement
+            .plan_frame(self.settings.selector.interval, &mut self.views);
+        self.selection = work.map(|w| (w, selection_from..self.views.len()));
         number(&mut self.views);
         for (camera, view) in cameras.iter_mut().zip(&self.views) {
             camera.capture = *view;
         }
         self.light_views = lights_from..maps_from;
-        self.env_map_views = maps_from..self.views.len();
+        self.env_map_views = maps_from..selection_from;
         let context = PrepareContext {
             device: &self.device,
             queue,
@@ -366,7 +366,8 @@ impl GiRenderer {
         self.passes
             .shadow_map_capture
             .record(encoder, &mut direct.capture, &shadow_inputs);
-        let Some(indirect) = &mut self.indirect else {
+        self.record_selection(encoder, inputs);
+        let (Some(direct), Some(indirect)) = (&self.direct, &mut self.indirect) else {
             return;
         };
         let capture_inputs = EnvMapCaptureInputs {
@@ -400,6 +401,25 @@ impl GiRenderer {
         self.passes
             .image_space_tracer
             .record(encoder, &mut indirect.tracer, &tracer_inputs);
+    }
+
+    /// Records this frame's share of the selection of places for environment maps.
+    fn record_selection(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) {
+        let Some((work, views)) = self.selection.take() else {
+            return;
+        };
+        if let (Some(state), Some(indirect)) = (&self.state, &self.indirect) {
+            let placement_inputs = PlacementInputs {
+                context: &selection_context(&self.device, inputs.queue, &self.settings, state),
+                geometry: inputs.geometry,
+                work: &work,
+                views: &self.views[views],
+                env_maps: &indirect.env_maps,
+                timestamps: inputs.timestamps,
+            };
+            self.placement
+                .record(encoder, &self.passes.env_map_selector, &placement_inputs);
+        }
     }
 
     /// Resources of a view of `size` pixels.
@@ -527,6 +547,12 @@ impl GiRenderer {
         self.indirect.as_ref().map(|i| &i.env_maps)
     }
 
+    /// Share, by area, of what valid candidates for environment maps see that the maps in use see; `None` until a
+    /// selection has arrived, and for maps placed by hand.
+    pub fn env_map_coverage(&self) -> Option<f32> {
+        self.placement.coverage()
+    }
+
     /// Shadow maps, while there is a light.
     pub fn shadow_maps(&self) -> Option<&ShadowMaps> {
         self.direct.as_ref().map(|d| &d.shadow_maps)
@@ -552,6 +578,7 @@ impl GiRenderer {
                 "env_maps",
                 indirect.env_maps.memory_use() + indirect.capture.memory_use(),
             ));
+            list.push(("env_map_selector", self.placement.memory_use()));
             list.push(("photons", indirect.photons.memory_use()));
             list.push(("uniforms", indirect.emitter.memory_use() + indirect.tracer.memory_use()));
         }
@@ -604,6 +631,23 @@ impl ViewResources {
     /// Bytes of this view.
     pub fn memory_use(&self) -> u64 {
         self.memory_by_resource().iter().map(|r| r.1).sum()
+    }
+}
+
+/// What the selection of places for environment maps needs to know.
+fn selection_context<'a>(
+    device: &'a wgpu::Device,
+    queue: &'a wgpu::Queue,
+    settings: &'a Settings,
+    state: &'a SceneState,
+) -> SelectionContext<'a> {
+    SelectionContext {
+        device,
+        queue,
+        frame: &state.frame,
+        region: &state.region,
+        settings: &settings.selector,
+        limit: settings.env_map_count,
     }
 }
 

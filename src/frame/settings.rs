@@ -2,15 +2,15 @@
 
 use crate::Error;
 use crate::pass::{
-    Bandwidth, EnvMapSelectorSettings, ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS, PhotonSplatterConfig,
-    PhotonSplatterSettings, SplatShape, TraceMethod,
+    Bandwidth, EnvMapSelectorResources, EnvMapSelectorSettings, ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS,
+    MAX_SELECTED, PhotonSplatterConfig, PhotonSplatterSettings, SplatShape, TraceMethod,
 };
 
 /// Most scatterings of a path.
 const MAX_BOUNCES: u32 = 64;
 
-/// Most environment maps: 6 × 42 + 1 layers of the 256 that every device grants.
-const MAX_ENV_MAPS: u32 = 42;
+/// Most candidates for environment maps.
+const MAX_CANDIDATES: u32 = EnvMapSelectorResources::MAX_CANDIDATES;
 
 /// Settings of all stages. Start from a preset and change fields, or [`Settings::set`] them by name.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,7 +22,8 @@ pub struct Settings {
     /// Surfaces that light scatters at before the one the eye sees, 0 to 64. 0: direct light only. Each costs a trace;
     /// leaving out bounces darkens.
     pub bounces: u32,
-    /// Environment maps, 1 to 42. More find more of what rays hit and cost six captures each.
+    /// Most environment maps, 1 to 31; fewer are used where fewer see enough. More find more of what rays hit and cost six
+    /// captures each.
     pub env_map_count: u32,
     /// Texels along a face of an environment map. Finer resolves thinner things and costs memory and capture time as the
     /// square.
@@ -55,6 +56,10 @@ impl Settings {
             env_map_count: 6,
             env_map_size: 64,
             shadow_map_size: 256,
+            selector: EnvMapSelectorSettings {
+                coverage_target: 0.99,
+                ..Default::default()
+            },
             tracer: ImageSpaceTracerSettings {
                 iterations: 5,
                 ..Default::default()
@@ -221,18 +226,23 @@ const KNOBS: &[Knob] = &[
     field!("frames", "1 or more", frames, |v| v >= 1),
     field!("photons", "0 to 100000000", photons, |v| v <= 100_000_000),
     field!("bounces", "0 to 64", bounces, |v| v <= MAX_BOUNCES),
-    field!("env_maps.count", "1 to 42", env_map_count, |v| (1..=MAX_ENV_MAPS)
+    field!("env_maps.count", "1 to 31", env_map_count, |v| (1..=MAX_SELECTED)
         .contains(&v)),
     field!("env_maps.size", "4 to 8192", env_map_size, |v| (4..=8192).contains(&v)),
     field!("shadow_maps.size", "4 to 8192", shadow_map_size, |v| (4..=8192)
         .contains(&v)),
-    field!("selector.candidates", "1 to 42", selector.candidates, |v| (1
-        ..=MAX_ENV_MAPS)
+    field!("selector.candidates", "1 to 512", selector.candidates, |v| (1
+        ..=MAX_CANDIDATES)
         .contains(&v)),
     field!("selector.back_face_limit", "0 to 1", selector.back_face_limit, |v| (0.0
         ..=1.0)
         .contains(&v)),
     field!("selector.clearance", "0 to 1", selector.clearance, |v| (0.0..=1.0)
+        .contains(&v)),
+    field!("selector.coverage_target", "0 to 1", selector.coverage_target, |v| (0.0
+        ..=1.0)
+        .contains(&v)),
+    field!("selector.interval", "1 to 60 frames", selector.interval, |v| (1..=60)
         .contains(&v)),
     choice!(
         "tracer.method",
@@ -371,7 +381,7 @@ mod tests {
         assert!(settings.set("splatter.kernel", "round").is_err());
         assert!(settings.set("photons", "many").is_err());
         assert_eq!(settings, Settings::balanced(), "a refused value changes nothing");
-        settings.env_map_count = 43;
+        settings.env_map_count = 32;
         assert!(matches!(settings.validate(), Err(Error::InvalidSetting { key, .. }) if key == "env_maps.count"));
     }
 }

@@ -24,7 +24,8 @@ pub use composite::{Composite, CompositeInputs, CompositeResources, CompositeSet
 pub use direct_light::{DirectLight, DirectLightInputs, DirectLightResources};
 pub use env_map_capture::{EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources};
 pub use env_map_selector::{
-    EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings, Sight,
+    EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings, MAX_SELECTED,
+    SelectBlockingInputs, Selection, SelectionStep, Sight,
 };
 pub use g_buffer_capture::{GBufferCapture, GBufferCaptureInputs};
 pub use image_space_tracer::{

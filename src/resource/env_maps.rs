@@ -16,7 +16,7 @@ fn layers(capacity: u32) -> u32 {
 /// [`cube_face::CUBE_FACES`](super::cube_face::CUBE_FACES). One layer is spare, because wgpu's GL backend takes an
 /// array of 6 k layers for a cube map. Texel: distance from the centre (f32 bits, unit frame; 0: nothing there),
 /// octahedral geometric normal, reflectance 11-11-10, class and flags. Distances are from a centre in the centres
-/// buffer, `array<vec4f>`, unit frame.
+/// buffer, `array<vec4f>`, unit frame; w is 1 for a map in use and 0 for one that is switched off.
 #[derive(Debug)]
 pub struct EnvMaps {
     view: wgpu::TextureView,
@@ -82,7 +82,8 @@ impl EnvMaps {
         capacity: u32,
         texture_bytes: u64,
     ) -> Result<Self, Error> {
-        let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+        use wgpu::BufferUsages as U;
+        let usage = U::STORAGE | U::COPY_DST | U::COPY_SRC;
         let bytes = 16 * u64::from(capacity.max(1));
         let can_render = texture.usage().contains(wgpu::TextureUsages::RENDER_ATTACHMENT);
         let faces = if can_render { 6 * capacity } else { 0 };
@@ -117,6 +118,11 @@ impl EnvMaps {
         Ok(())
     }
 
+    /// Makes the next `set_centers` write, and so switch on, even the centres that it has.
+    pub(crate) fn forget_centers(&mut self) {
+        self.centers.clear();
+    }
+
     /// The views that fill these maps, six a centre, in layer order.
     pub fn views(&self, purpose: CapturePurpose) -> impl Iterator<Item = CaptureView> + '_ {
         self.centers.iter().flat_map(move |&center| {
@@ -134,7 +140,7 @@ impl EnvMaps {
         self.face_views.get(layer as usize)
     }
 
-    /// Centres, `array<vec4f>`, unit frame.
+    /// Centres, `array<vec4f>`, unit frame; w: 1 in use, 0 switched off.
     pub fn centers_buffer(&self) -> &wgpu::Buffer {
         &self.centers_buffer
     }

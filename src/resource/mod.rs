@@ -16,6 +16,7 @@ mod shadow_maps;
 pub(crate) mod view;
 
 pub use env_maps::EnvMaps;
+pub(crate) use env_maps::SURFACE_FORMAT;
 pub use g_buffer::{GBuffer, GBufferViews, NormalEncoding};
 pub use geometry::{CaptureTargets, Geometry, PrepareContext};
 pub use irradiance::Irradiance;

@@ -5,7 +5,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Names accepted by [`by_name`], in the order of this list.
-pub const NAMES: [&str; 5] = ["cornell", "cornell-spot", "plane", "furnace", "two-rooms"];
+pub const NAMES: [&str; 6] = ["cornell", "cornell-spot", "plane", "furnace", "two-rooms", "pillars"];
 
 /// The sample of this name at `time`, or `None` if there is none.
 pub fn by_name(name: &str, time: f64) -> Option<Scene> {
@@ -15,6 +15,7 @@ pub fn by_name(name: &str, time: f64) -> Option<Scene> {
         "plane" => plane(),
         "furnace" => furnace(0.5, 1.0),
         "two-rooms" => two_rooms(time),
+        "pillars" => pillars(time),
         _ => return None,
     })
 }
@@ -120,6 +121,43 @@ pub fn two_rooms(time: f64) -> Scene {
         DVec3::new(-0.2, 0.4, 1.2),
         DVec3::Y,
         70f64.to_radians(),
+    );
+    builder.scene
+}
+
+/// A hall of 12 × 4 × 8 m with two rows of three pillars and a partition that leaves a passage to an alcove: no place sees
+/// all of it. A bulb hangs in the middle; a crate slides along the hall and back, once in four seconds.
+pub fn pillars(time: f64) -> Scene {
+    let mut builder = Builder::default();
+    let white = builder.material(Material::diffuse("white", [0.73; 3]));
+    let sandstone = builder.material(Material::diffuse("sandstone", [0.6, 0.5, 0.35]));
+    let blue = builder.material(Material::diffuse("blue", [0.1, 0.2, 0.6]));
+    builder.quad_strip("hall", inward_box([-6.0, 0.0, -4.0], [6.0, 4.0, 4.0]), white);
+    for x in [-3.5, -0.5, 2.5] {
+        for z in [-1.6, 1.6] {
+            let mut pillar = cuboid([x - 0.3, 0.0, z - 0.3], [x + 0.3, 4.0, z + 0.3]);
+            pillar.name = "pillar".into();
+            builder.mesh(pillar, sandstone);
+        }
+    }
+    let mut partition = cuboid([4.0, 0.0, -4.0], [4.2, 4.0, 2.5]);
+    partition.name = "partition".into();
+    builder.mesh(partition, blue);
+    let mut crate_box = cuboid([-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]);
+    crate_box.name = "crate".into();
+    let crate_box = builder.mesh(crate_box, sandstone);
+    let along = -4.5 + 7.0 * 0.5 * (1.0 - (TAU * time / 4.0).cos());
+    builder.scene.instances[crate_box].transform = DAffine3::from_translation(DVec3::new(along, 0.0, 0.0));
+    builder.scene.lights.push(Light {
+        name: "bulb".into(),
+        ..Light::point(DVec3::new(1.0, 3.2, 0.2), 40.0, [1.0, 0.92, 0.8])
+    });
+    builder.look(
+        "hall",
+        DVec3::new(-5.6, 2.2, 3.4),
+        DVec3::new(1.0, 1.2, -0.6),
+        DVec3::Y,
+        65f64.to_radians(),
     );
     builder.scene
 }
@@ -280,19 +318,27 @@ fn prism(name: &str, base: [[f32; 2]; 4], height: f32) -> Mesh {
 
 /// A closed axis-aligned box, facing outward.
 fn cuboid(min: [f32; 3], max: [f32; 3]) -> Mesh {
-    let ([x0, y0, z0], [x1, y1, z1]) = (min, max);
     let mut mesh = Mesh::default();
-    for quad in [
+    for quad in box_faces(min, max) {
+        push_quad(&mut mesh, quad);
+    }
+    mesh
+}
+
+/// The faces of a box as seen from inside it.
+fn inward_box(min: [f32; 3], max: [f32; 3]) -> Vec<[[f32; 3]; 4]> {
+    box_faces(min, max).map(|[a, b, c, d]| [d, c, b, a]).to_vec()
+}
+
+fn box_faces([x0, y0, z0]: [f32; 3], [x1, y1, z1]: [f32; 3]) -> [[[f32; 3]; 4]; 6] {
+    [
         [[x0, y0, z1], [x1, y0, z1], [x1, y1, z1], [x0, y1, z1]],
         [[x1, y0, z0], [x0, y0, z0], [x0, y1, z0], [x1, y1, z0]],
         [[x1, y0, z1], [x1, y0, z0], [x1, y1, z0], [x1, y1, z1]],
         [[x0, y0, z0], [x0, y0, z1], [x0, y1, z1], [x0, y1, z0]],
         [[x0, y1, z1], [x1, y1, z1], [x1, y1, z0], [x0, y1, z0]],
         [[x0, y0, z0], [x1, y0, z0], [x1, y0, z1], [x0, y0, z1]],
-    ] {
-        push_quad(&mut mesh, quad);
-    }
-    mesh
+    ]
 }
 
 /// A unit sphere whose triangles face inward.
@@ -362,7 +408,7 @@ mod tests {
 
     #[test]
     fn something_moves_in_each_sample_that_says_so() {
-        for name in ["cornell", "cornell-spot", "two-rooms"] {
+        for name in ["cornell", "cornell-spot", "two-rooms", "pillars"] {
             let (a, b) = (by_name(name, 0.0).unwrap(), by_name(name, 1.0).unwrap());
             assert!(a.instances != b.instances || a.lights != b.lights, "{name}");
         }

@@ -60,6 +60,9 @@ fn false_position_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
     var asked = 0u;
     for (var round = 0u; round < 2u; round++) {
         for (var map = 0u; map < params.map_count; map++) {
+            if !trace_is_on(map) {
+                continue;
+            }
             let center = centers[map].xyz;
             let x = origin - center;
             if round == 0u && method != METHOD_PAPER && !trace_sees(map, x, normal) {

@@ -94,7 +94,7 @@ fn march_next_map(origin: vec3f, last: vec2f) -> vec2f {
     for (var map = 0u; map < params.map_count; map++) {
         let candidate = vec2f(distance(origin, centers[map].xyz), f32(map));
         let is_later = candidate.x > last.x || (candidate.x == last.x && candidate.y > last.y);
-        if is_later && candidate.x < next.x {
+        if is_later && candidate.x < next.x && trace_is_on(map) {
             next = candidate;
         }
     }
@@ -121,6 +121,9 @@ fn ordered_march_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
         for (var i = 0u; i < params.map_count; i++) {
             ordered = march_next_map(origin, ordered);
             let map = u32(ordered.y);
+            if map >= params.map_count {
+                break;
+            }
             let center = centers[map].xyz;
             let x = origin - center;
             let knows = march_knows(map, x, normal, r, free);

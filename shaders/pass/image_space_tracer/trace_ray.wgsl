@@ -33,6 +33,11 @@ fn trace_nothing(kind: u32) -> Hit {
     return Hit(kind, TRACE_FURTHEST, vec3f(0.0), vec3f(0.0), vec3f(0.0));
 }
 
+// Whether a map is to be asked: while its place is not yet known to be a good one it may be switched off.
+fn trace_is_on(map: u32) -> bool {
+    return centers[map].w > 0.0;
+}
+
 // Distance of the map's surface in the direction of p; beyond all rays where there is none.
 fn trace_surface(map: u32, p: vec3f) -> f32 {
     let stored = env_map_distance(map, p, params.map_size);

@@ -16,6 +16,7 @@ struct Params {
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var env_maps: texture_2d_array<u32>;
+// w: 1 where the map is to be asked, 0 where it is switched off
 @group(0) @binding(2) var<storage, read> centers: array<vec4f>;
 @group(0) @binding(3) var<storage, read_write> photons: array<Photon>;
 

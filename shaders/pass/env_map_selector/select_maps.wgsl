@@ -1,0 +1,375 @@
+// The selection itself: which candidates together see the most (Yao et al. 2010, section 4). Every step is a dispatch; a
+// step that finds the work done returns at once, so that the host records them all without knowing how many it takes.
+
+struct Params {
+    candidate_count: u32,
+    // Tiles in a row of the atlas
+    columns: u32,
+    // Most maps to select
+    limit: u32,
+    // Handed back with the result
+    tag: u32,
+    back_face_limit: f32,
+    // Unit frame
+    clearance: f32,
+    // How far behind a texel's plane a point may lie and still be seen, unit frame
+    tolerance: f32,
+    coverage_target: f32,
+}
+
+// What one candidate sees.
+struct Sight {
+    surfaces: u32,
+    back_faces: u32,
+    // f32 bits of the nearest distance; all ones if there is none
+    nearest: u32,
+    is_valid: u32,
+    // A(v | nothing): area seen
+    area: f32,
+    // Part of it that no selected map sees
+    unseen: f32,
+    // Part of it that no selected map but this one sees
+    own: f32,
+    // All of it, halved for each selected map that sees it
+    seldom_seen: f32,
+}
+
+struct Selection {
+    tag: u32,
+    // Bits of `chosen` in use
+    selected: u32,
+    // Bit added last; NONE: nothing was added
+    newest: u32,
+    is_done: u32,
+    // The last swap gave back what it took
+    is_stable: u32,
+    swaps: u32,
+    coverage: f32,
+    pad: u32,
+    // Candidate by bit
+    chosen: array<u32, 32>,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var atlas: texture_2d<u32>;
+@group(0) @binding(2) var<storage, read> centers: array<vec4f>;
+@group(0) @binding(3) var<storage, read_write> sights: array<Sight>;
+// For each texel of each candidate, one bit for each selected map that sees its surface
+@group(0) @binding(4) var<storage, read_write> seen_by: array<u32>;
+@group(0) @binding(5) var<storage, read_write> selection: Selection;
+// Centres of environment maps in use, w: 1 on, 0 off
+@group(1) @binding(0) var<storage, read_write> map_centers: array<vec4f>;
+
+const NONE: u32 = 0xffffffffu;
+// Where nothing new is to be seen, a second look at the same is still worth something to rays; little enough that a
+// thousandth of new area weighs more.
+const SELDOM_SEEN_WEIGHT: f32 = 0x1p-10;
+const LANES: u32 = 256u;
+
+var<workgroup> counted: array<atomic<u32>, 2>;
+var<workgroup> nearest: atomic<u32>;
+var<workgroup> sums: array<vec3f, LANES>;
+var<workgroup> best: array<vec2f, LANES>;
+var<workgroup> is_done: u32;
+
+fn bit_of_candidate(candidate: u32) -> u32 {
+    for (var bit = 0u; bit < 32u; bit++) {
+        if (selection.selected >> bit & 1u) == 1u && selection.chosen[bit] == candidate {
+            return bit;
+        }
+    }
+    return NONE;
+}
+
+// Adds up what every lane brings, always in the same order.
+fn sum_lanes(lane: u32, value: vec3f) -> vec3f {
+    sums[lane] = value;
+    workgroupBarrier();
+    for (var half = LANES / 2u; half > 0u; half /= 2u) {
+        if lane < half {
+            sums[lane] += sums[lane + half];
+        }
+        workgroupBarrier();
+    }
+    let total = sums[0];
+    workgroupBarrier();
+    return total;
+}
+
+// The candidate of the greatest value among the lanes' own (value, candidate); the first of equals.
+fn best_of_lanes(lane: u32, own: vec2f) -> vec2f {
+    best[lane] = own;
+    workgroupBarrier();
+    for (var half = LANES / 2u; half > 0u; half /= 2u) {
+        if lane < half {
+            let other = best[lane + half];
+            let mine = best[lane];
+            if other.x > mine.x || (other.x == mine.x && other.y < mine.y) {
+                best[lane] = other;
+            }
+        }
+        workgroupBarrier();
+    }
+    let winner = best[0];
+    workgroupBarrier();
+    return winner;
+}
+
+// Forgets every map.
+@compute @workgroup_size(1)
+fn start_anew() {
+    selection.selected = 0u;
+    selection.swaps = 0u;
+}
+
+// What each candidate sees: a workgroup for each.
+@compute @workgroup_size(256)
+fn inspect_candidates(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let candidate = group.x;
+    if lane == 0u {
+        atomicStore(&counted[0], 0u);
+        atomicStore(&counted[1], 0u);
+        atomicStore(&nearest, NONE);
+    }
+    workgroupBarrier();
+    var area = 0.0;
+    for (var i = lane; i < CANDIDATE_TEXELS; i += LANES) {
+        let texel = candidate_texel(candidate, i);
+        seen_by[candidate * CANDIDATE_TEXELS + i] = 0u;
+        if texel.surface.distance > 0.0 {
+            atomicAdd(&counted[0], 1u);
+            atomicMin(&nearest, bitcast<u32>(texel.surface.distance));
+        }
+        if (texel.surface.flags & SURFACE_TEXEL_BACK_FACE) != 0u {
+            atomicAdd(&counted[1], 1u);
+        }
+        area += candidate_area(texel);
+    }
+    let total = sum_lanes(lane, vec3f(area, 0.0, 0.0)).x;
+    if lane == 0u {
+        let surfaces = atomicLoad(&counted[0]);
+        let back_faces = atomicLoad(&counted[1]);
+        let closest = atomicLoad(&nearest);
+        let is_outside = f32(back_faces) <= params.back_face_limit * f32(surfaces);
+        let is_clear = bitcast<f32>(closest) >= params.clearance;
+        let is_valid = surfaces > 0u && is_outside && is_clear;
+        sights[candidate] = Sight(surfaces, back_faces, closest, u32(is_valid), total, total, total, total);
+    }
+}
+
+// Before any step: gives up selected maps whose place is no longer valid. If no candidate is valid, those that see the
+// smallest share of back faces are admitted, so that a scene of inside-out surfaces still gets its light.
+@compute @workgroup_size(256)
+fn admit_candidates(@builtin(local_invocation_index) lane: u32) {
+    var valid = 0.0;
+    var least_inside = vec2f(-2.0, 0.0);
+    for (var i = lane; i < params.candidate_count; i += LANES) {
+        valid += f32(sights[i].is_valid);
+        if sights[i].surfaces > 0u {
+            let inside = f32(sights[i].back_faces) / f32(sights[i].surfaces);
+            least_inside = select(least_inside, vec2f(-inside, 0.0), -inside > least_inside.x);
+        }
+    }
+    valid = sum_lanes(lane, vec3f(valid, 0.0, 0.0)).x;
+    let share = -best_of_lanes(lane, least_inside).x;
+    for (var i = lane; i < params.candidate_count && valid == 0.0; i += LANES) {
+        let surfaces = f32(sights[i].surfaces);
+        sights[i].is_valid = u32(surfaces > 0.0 && f32(sights[i].back_faces) <= share * surfaces);
+    }
+    storageBarrier();
+    if lane == 0u {
+        for (var bit = 0u; bit < 32u; bit++) {
+            let candidate = selection.chosen[bit];
+            if (selection.selected >> bit & 1u) == 1u && sights[candidate].is_valid == 0u {
+                selection.selected &= ~(1u << bit);
+            }
+        }
+        selection.tag = params.tag;
+        selection.newest = NONE;
+        selection.is_done = 0u;
+        selection.is_stable = 0u;
+    }
+}
+
+fn mark(candidate: u32, lane: u32, bits: u32) {
+    for (var i = lane; i < CANDIDATE_TEXELS; i += LANES) {
+        let texel = candidate_texel(candidate, i);
+        if texel.surface.distance <= 0.0 {
+            continue;
+        }
+        let at = candidate * CANDIDATE_TEXELS + i;
+        let p = centers[candidate].xyz + texel.direction * texel.surface.distance;
+        var mask = seen_by[at] & ~bits;
+        for (var left = bits; left != 0u; left &= left - 1u) {
+            let bit = countTrailingZeros(left);
+            if candidate_sees(selection.chosen[bit], p, texel.surface.normal) {
+                mask |= 1u << bit;
+            }
+        }
+        seen_by[at] = mask;
+    }
+}
+
+// Every texel of every candidate against all selected maps.
+@compute @workgroup_size(256)
+fn mark_all(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    mark(group.x, lane, selection.selected);
+}
+
+// And against the newest alone.
+@compute @workgroup_size(256)
+fn mark_newest(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    if selection.is_done == 0u && selection.newest != NONE {
+        mark(group.x, lane, 1u << selection.newest);
+    }
+}
+
+// A(v | C) of every candidate, A(v | C - v) of those selected, and what is seldom seen.
+@compute @workgroup_size(256)
+fn sum_unseen(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let candidate = group.x;
+    if lane == 0u {
+        is_done = selection.is_done;
+    }
+    if workgroupUniformLoad(&is_done) != 0u {
+        return;
+    }
+    let bit = bit_of_candidate(candidate);
+    let others = selection.selected & ~select(0u, 1u << (bit & 31u), bit != NONE);
+    var sum = vec3f(0.0);
+    for (var i = lane; i < CANDIDATE_TEXELS; i += LANES) {
+        let seen = seen_by[candidate * CANDIDATE_TEXELS + i] & selection.selected;
+        let area = candidate_area(candidate_texel(candidate, i));
+        let halved = area * exp2(-f32(countOneBits(seen)));
+        sum += vec3f(select(0.0, area, seen == 0u), select(0.0, area, (seen & others) == 0u), halved);
+    }
+    let total = sum_lanes(lane, sum);
+    if lane == 0u {
+        sights[candidate].unseen = total.x;
+        sights[candidate].own = total.y;
+        sights[candidate].seldom_seen = total.z;
+    }
+}
+
+// Of what valid candidates see, the share that selected maps see.
+fn coverage(lane: u32) -> f32 {
+    var area = vec3f(0.0);
+    for (var i = lane; i < params.candidate_count; i += LANES) {
+        area += select(vec3f(0.0), vec3f(sights[i].unseen, sights[i].area, 0.0), sights[i].is_valid == 1u);
+    }
+    let total = sum_lanes(lane, area);
+    return select(0.0, 1.0 - total.x / total.y, total.y > 0.0);
+}
+
+// The unselected candidate that sees the most new, or all but nothing new and the most of what few maps see;
+// NONE if there is none left.
+fn best_addition(lane: u32) -> u32 {
+    var own = vec2f(-1.0, f32(params.candidate_count));
+    for (var i = lane; i < params.candidate_count; i += LANES) {
+        let is_free = sights[i].is_valid == 1u && bit_of_candidate(i) == NONE;
+        let worth = sights[i].unseen + SELDOM_SEEN_WEIGHT * sights[i].seldom_seen;
+        if is_free && worth > own.x {
+            own = vec2f(worth, f32(i));
+        }
+    }
+    let winner = best_of_lanes(lane, own);
+    return select(NONE, u32(winner.y), winner.x >= 0.0);
+}
+
+fn add(candidate: u32) {
+    let bit = countTrailingZeros(~selection.selected);
+    selection.selected |= 1u << bit;
+    selection.chosen[bit] = candidate;
+    selection.newest = bit;
+}
+
+// Greedy: takes the best addition, unless there are enough maps or enough is seen.
+@compute @workgroup_size(256)
+fn add_map(@builtin(local_invocation_index) lane: u32) {
+    let covered = coverage(lane);
+    let addition = best_addition(lane);
+    if lane != 0u || selection.is_done != 0u {
+        return;
+    }
+    let count = countOneBits(selection.selected);
+    if count >= params.limit || addition == NONE || (count > 0u && is_satisfied(covered)) {
+        selection.is_done = 1u;
+    } else {
+        add(addition);
+    }
+}
+
+// A target of 1 is never met.
+fn is_satisfied(covered: f32) -> bool {
+    return params.coverage_target < 1.0 && covered >= params.coverage_target;
+}
+
+// After the greedy steps: swaps may follow, unless all that was asked for is seen.
+@compute @workgroup_size(256)
+fn begin_swaps(@builtin(local_invocation_index) lane: u32) {
+    let covered = coverage(lane);
+    if lane == 0u {
+        selection.is_done = u32(is_satisfied(covered));
+        selection.is_stable = selection.is_done;
+    }
+}
+
+// First half of a swap: one map more than there may be.
+@compute @workgroup_size(256)
+fn add_for_swap(@builtin(local_invocation_index) lane: u32) {
+    let addition = best_addition(lane);
+    if lane != 0u || selection.is_done != 0u {
+        return;
+    }
+    if addition == NONE {
+        selection.is_done = 1u;
+        selection.is_stable = 1u;
+    } else {
+        add(addition);
+    }
+}
+
+// Second half: the map that sees the least that no other does. If it is the newest, the selection is stable.
+@compute @workgroup_size(1)
+fn drop_map() {
+    if selection.is_done != 0u {
+        return;
+    }
+    var dropped = selection.newest;
+    var least = sights[selection.chosen[dropped]].own;
+    for (var bit = 0u; bit < 32u; bit++) {
+        if (selection.selected >> bit & 1u) == 1u && sights[selection.chosen[bit]].own < least {
+            least = sights[selection.chosen[bit]].own;
+            dropped = bit;
+        }
+    }
+    selection.selected &= ~(1u << dropped);
+    if dropped == selection.newest {
+        selection.is_done = 1u;
+        selection.is_stable = 1u;
+    } else {
+        selection.swaps += 1u;
+    }
+}
+
+// What the selection as it now stands covers; the sums must be summed once more for it.
+@compute @workgroup_size(1)
+fn end_steps() {
+    selection.is_done = 0u;
+}
+
+@compute @workgroup_size(256)
+fn measure_coverage(@builtin(local_invocation_index) lane: u32) {
+    let covered = coverage(lane);
+    if lane == 0u {
+        selection.coverage = covered;
+    }
+}
+
+// Until a selection arrives, maps stand at the first candidates: those at invalid ones are switched off.
+@compute @workgroup_size(64)
+fn switch_maps(@builtin(global_invocation_id) id: vec3u) {
+    if id.x < min(arrayLength(&map_centers), params.candidate_count) {
+        map_centers[id.x].w = f32(sights[id.x].is_valid);
+    }
+}
