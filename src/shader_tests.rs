@@ -4,7 +4,7 @@
 use crate::gpu::Slot;
 use crate::pass::{
     accumulator, composite, direct_light, env_map_selector, image_space_tracer, photon_emitter, photon_splatter,
-    tone_map, trace_statistics,
+    tone_map, trace_statistics, upsampler,
 };
 use crate::resource::{Photon, PhotonState, g_buffer, lights, mesh_geometry, view};
 use crate::wgsl;
@@ -232,13 +232,14 @@ fn twins() -> Vec<Twin> {
             scale, uniform_density, lowest, highest,
         }),
         twin!(wgsl::PHOTON_SPLATTER_TILED, "Params", photon_splatter::gpu::TiledParams {
-            bandwidth, first_slot, slot_count, tile_columns, tile_rows, row, max_radius, capacity,
+            bandwidth, first_slot, slot_count, tile_columns, tile_rows, row, max_radius, capacity, factor,
         }),
         twin!(wgsl::PHOTON_SPLATTER_TILED, "Splat", photon_splatter::gpu::Splat { position, radius, flux, normal }),
         twin!(wgsl::PHOTON_SPLATTER_TILED, "Tile", photon_splatter::gpu::Tile { count, first, filled, brightest }),
         twin!(wgsl::PHOTON_SPLATTER_QUADS, "Params", photon_splatter::gpu::QuadParams {
-            bandwidth, first_slot, max_radius,
+            bandwidth, clip_scale, clip_shift, first_slot, max_radius, factor, _pad,
         }),
+        twin!(wgsl::UPSAMPLER, "Params", upsampler::gpu::Params { factor, normal_agreement, plane_distance }),
         twin!(wgsl::DIRECT_LIGHT, "Params", direct_light::gpu::Params { light_count, shadow_map_size }),
         twin!(wgsl::COMPOSITE, "Params", composite::gpu::Params {
             output_scale, direct_weight, indirect_weight, emission_weight,
@@ -353,6 +354,7 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "ImageSpaceTracer" => vec![&image_space_tracer::SLOTS],
         "PhotonSplatter tiled" => vec![&photon_splatter::TILED_SLOTS],
         "PhotonSplatter quads" => vec![&photon_splatter::QUAD_SLOTS],
+        "Upsampler" => vec![&upsampler::SLOTS],
         "DirectLight" => vec![&direct_light::SLOTS],
         "Composite" => vec![&composite::SLOTS],
         "Accumulator" => vec![&accumulator::SLOTS],

@@ -64,6 +64,7 @@ pub(crate) const PHOTON_SPLATTER_TILED: &str = compose![
     "pass/photon_splatter/splat.wgsl",
     "common/photon.wgsl",
     "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
     "common/octahedral.wgsl",
 ];
 
@@ -72,8 +73,16 @@ pub(crate) const PHOTON_SPLATTER_QUADS: &str = compose![
     "pass/photon_splatter/splat.wgsl",
     "common/photon.wgsl",
     "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
     "common/octahedral.wgsl",
     "common/sampling.wgsl",
+];
+
+pub(crate) const UPSAMPLER: &str = compose![
+    "pass/upsampler.wgsl",
+    "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
+    "common/octahedral.wgsl",
 ];
 
 pub(crate) const DIRECT_LIGHT: &str = compose![
@@ -125,6 +134,7 @@ pub const MODULES: [(&str, &str); 12] = [
     ("ImageSpaceTracer", IMAGE_SPACE_TRACER),
     ("PhotonSplatter tiled", PHOTON_SPLATTER_TILED),
     ("PhotonSplatter quads", PHOTON_SPLATTER_QUADS),
+    ("Upsampler", UPSAMPLER),
     ("DirectLight", DIRECT_LIGHT),
     ("Composite", COMPOSITE),
     ("Accumulator", ACCUMULATOR),
@@ -137,6 +147,7 @@ pub const MODULES: [(&str, &str); 12] = [
 /// Functions of `shaders/common/` that tests compare with `f64` twins.
 #[doc(hidden)]
 pub const COMMON: &str = compose![
+    "common/subsampling.wgsl",
     "common/octahedral.wgsl",
     "common/reflectance.wgsl",
     "common/cube_face.wgsl",

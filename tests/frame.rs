@@ -80,12 +80,30 @@ fn every_pass_is_made_and_recorded_on_a_device_that_grants_only_the_defaults() {
 
 fn make_and_record_every_pass(device: &wgpu::Device, queue: &wgpu::Queue) {
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
-    for (shape, kernel, method) in [
-        (SplatShape::Tiled, Kernel::Epanechnikov, TraceMethod::OrderedMarch),
-        (SplatShape::Tiled, Kernel::Cone, TraceMethod::Plane),
-        (SplatShape::Quads, Kernel::Constant, TraceMethod::Paper),
+    for (shape, kernel, method, subsampling) in [
+        (
+            SplatShape::Tiled,
+            Kernel::Epanechnikov,
+            TraceMethod::OrderedMarch,
+            Subsampling::Full,
+        ),
+        (SplatShape::Tiled, Kernel::Cone, TraceMethod::Plane, Subsampling::Half),
+        (
+            SplatShape::Quads,
+            Kernel::Constant,
+            TraceMethod::Paper,
+            Subsampling::Quarter,
+        ),
+        (SplatShape::Quads, Kernel::Cone, TraceMethod::Plane, Subsampling::Full),
+        (
+            SplatShape::Tiled,
+            Kernel::Constant,
+            TraceMethod::Plane,
+            Subsampling::Eighth,
+        ),
     ] {
         let mut settings = small();
+        settings.subsampling = subsampling;
         settings.splatter_config.shape = shape;
         settings.splatter_config.kernel = kernel;
         settings.tracer.method = method;
@@ -230,6 +248,7 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
         queue,
         photons: &photons,
         g_buffer: &g_buffer,
+        subsampling: settings.subsampling,
         irradiance: &indirect,
         area: (summary.area / (unit * unit)) as f32,
         radius: frame.radius(),

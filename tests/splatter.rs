@@ -9,7 +9,9 @@ use lightfall::pass::{
     Bandwidth, Kernel, PhotonSplatter, PhotonSplatterConfig, PhotonSplatterInputs, PhotonSplatterResources,
     PhotonSplatterSettings, SplatShape,
 };
-use lightfall::resource::{CameraView, GBuffer, GBufferViews, Irradiance, NormalEncoding, Photon, Photons};
+use lightfall::resource::{
+    CameraView, GBuffer, GBufferViews, Irradiance, NormalEncoding, Photon, Photons, Subsampling,
+};
 use lightfall::{read_rgba32float_blocking, wgpu};
 
 const SIZE: u32 = 64;
@@ -99,6 +101,7 @@ fn splat(gpu: &Gpu, config: PhotonSplatterConfig, photons: &[Photon], radius: f3
         queue: &gpu.queue,
         photons: &resource,
         g_buffer: &g_buffer,
+        subsampling: Subsampling::Full,
         irradiance: &irradiance,
         area: 4.0,
         radius: 1.0,

@@ -17,6 +17,34 @@ fn g_buffer_position(view: View, pixel: vec2f, depth: f32) -> vec3f {
     return p.xyz / p.w;
 }
 
+// Cosine of the largest angle between geometric and shading normal: beyond it, the neighbours that gave the geometric
+// one do not lie on the pixel's surface.
+const G_BUFFER_NORMAL_AGREEMENT: f32 = 0.7;
+
+// Positions of the pixels next to one; its own beyond the rim.
+struct Neighbours {
+    left: vec3f,
+    right: vec3f,
+    above: vec3f,
+    below: vec3f,
+}
+
+// Geometric normal at a pixel: from depth where the nearer neighbours lie on one surface, else the shading normal.
+fn g_buffer_geometric_normal(view: View, pixel: vec2i, p: vec3f, around: Neighbours, shading: vec3f) -> vec3f {
+    let limit = vec2i(view.size) - 1;
+    let x0 = p - around.left;
+    let x1 = around.right - p;
+    let y0 = p - around.above;
+    let y1 = around.below - p;
+    let use_x1 = pixel.x == 0 || (pixel.x < limit.x && dot(x1, x1) < dot(x0, x0));
+    let use_y1 = pixel.y == 0 || (pixel.y < limit.y && dot(y1, y1) < dot(y0, y0));
+    let n = cross(select(x0, x1, use_x1), select(y0, y1, use_y1));
+    let length_squared = dot(n, n);
+    let unit = n * inverseSqrt(max(length_squared, 0x1p-126));
+    let facing = select(-unit, unit, dot(unit, shading) > 0.0);
+    return select(shading, facing, length_squared > 0x1p-120 && dot(facing, shading) > G_BUFFER_NORMAL_AGREEMENT);
+}
+
 // Unit normal from a host's texel.
 fn g_buffer_normal(view: View, texel: vec4f) -> vec3f {
     let half_offset = (view.normal_encoding & 1u) == 1u;

@@ -11,11 +11,12 @@ use crate::pass::{
     DirectLightResources, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapSelector, GBufferCapture,
     GBufferCaptureInputs, ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitter,
     PhotonEmitterInputs, PhotonEmitterResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources,
-    ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources,
+    ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources, Upsampler, UpsamplerInputs,
+    UpsamplerResources,
 };
 use crate::resource::{
     CameraView, CapturePurpose, CaptureView, EnvMaps, GBuffer, Geometry, Irradiance, Lights, Photons, PrepareContext,
-    Radiance, ShadowMaps,
+    Radiance, ShadowMaps, Subsampling,
 };
 use crate::scene::{Light, SceneBounds, SceneSummary, UnitFrame};
 use crate::{Error, Timestamps};
@@ -53,6 +54,7 @@ struct Passes {
     photon_emitter: PhotonEmitter,
     image_space_tracer: ImageSpaceTracer,
     photon_splatter: PhotonSplatter,
+    upsampler: Upsampler,
     composite: Composite,
 }
 
@@ -93,10 +95,19 @@ pub struct ViewResources {
     radiance: Radiance,
     composite: CompositeResources,
     direct: Option<(Irradiance, DirectLightResources)>,
-    indirect: Option<(Irradiance, PhotonSplatterResources)>,
+    indirect: Option<IndirectView>,
     size: [u32; 2],
     /// Of the renderer that `direct` and `indirect` were made for.
     generation: u64,
+}
+
+/// Allocated while there is indirect light.
+#[derive(Debug)]
+struct IndirectView {
+    irradiance: Irradiance,
+    splatter: PhotonSplatterResources,
+    /// Allocated while fewer pixels are estimated than seen.
+    coarse: Option<(Irradiance, UpsamplerResources)>,
 }
 
 /// What [`GiRenderer::record_scene`] needs.
@@ -156,6 +167,7 @@ impl GiRenderer {
             photon_emitter: PhotonEmitter::new(device),
             image_space_tracer: ImageSpaceTracer::new(device),
             photon_splatter: PhotonSplatter::new(device, &settings.splatter_config)?,
+            upsampler: Upsampler::new(device),
             composite: Composite::new(device, wgpu::TextureFormat::Rgba32Float),
         };
         Ok(Self {
@@ -469,26 +481,39 @@ impl GiRenderer {
             };
             self.passes.direct_light.record(encoder, own, &direct_inputs);
         }
-        if let (Some(scene), Some((irradiance, own)), Some(state)) =
-            (&self.indirect, &mut resources.indirect, &self.state)
-        {
+        if let (Some(scene), Some(own), Some(state)) = (&self.indirect, &mut resources.indirect, &self.state) {
             let splatter_inputs = PhotonSplatterInputs {
                 queue: inputs.queue,
                 photons: &scene.photons,
                 g_buffer: &resources.g_buffer,
-                irradiance,
+                subsampling: self.settings.subsampling,
+                irradiance: own.coarse.as_ref().map_or(&own.irradiance, |c| &c.0),
                 area: state.area,
                 radius: state.frame.radius(),
                 settings: &self.settings.splatter,
                 timestamps: inputs.timestamps,
             };
-            self.passes.photon_splatter.record(encoder, own, &splatter_inputs);
+            self.passes
+                .photon_splatter
+                .record(encoder, &mut own.splatter, &splatter_inputs);
+            if let Some((coarse, upsampler)) = &mut own.coarse {
+                let upsampler_inputs = UpsamplerInputs {
+                    queue: inputs.queue,
+                    g_buffer: &resources.g_buffer,
+                    coarse,
+                    subsampling: self.settings.subsampling,
+                    irradiance: &own.irradiance,
+                    settings: &self.settings.upsampler,
+                    timestamps: inputs.timestamps,
+                };
+                self.passes.upsampler.record(encoder, upsampler, &upsampler_inputs);
+            }
         }
         let composite_inputs = CompositeInputs {
             queue: inputs.queue,
             g_buffer: &resources.g_buffer,
             direct: resources.direct.as_ref().map_or(&self.black, |d| &d.0),
-            indirect: resources.indirect.as_ref().map_or(&self.black, |i| &i.0),
+            indirect: resources.indirect.as_ref().map_or(&self.black, |i| &i.irradiance),
             radiance: &resources.radiance,
             settings: inputs.composite,
             timestamps: inputs.timestamps,
@@ -517,10 +542,7 @@ impl GiRenderer {
         match &self.indirect {
             None => view.indirect = None,
             Some(scene) if view.indirect.is_none() => {
-                let config = &self.settings.splatter_config;
-                let irradiance = Irradiance::new(device, size, config.format())?;
-                let own = PhotonSplatterResources::new(device, config, &scene.photons, size)?;
-                view.indirect = Some((irradiance, own));
+                view.indirect = Some(IndirectView::new(device, &self.settings, &scene.photons, size)?);
             }
             Some(_) => {}
         }
@@ -591,6 +613,26 @@ impl GiRenderer {
     }
 }
 
+impl IndirectView {
+    fn new(device: &wgpu::Device, settings: &Settings, photons: &Photons, size: [u32; 2]) -> Result<Self, Error> {
+        let config = &settings.splatter_config;
+        let estimated = settings.subsampling.size(size);
+        let splatted = Irradiance::new(device, estimated, config.format())?;
+        let splatter = PhotonSplatterResources::new(device, config, photons, estimated)?;
+        let (irradiance, coarse) = if settings.subsampling == Subsampling::Full {
+            (splatted, None)
+        } else {
+            let full = Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?;
+            (full, Some((splatted, UpsamplerResources::new(device)?)))
+        };
+        Ok(Self {
+            irradiance,
+            splatter,
+            coarse,
+        })
+    }
+}
+
 impl ViewResources {
     /// The finished image.
     pub fn radiance(&self) -> &Radiance {
@@ -609,7 +651,7 @@ impl ViewResources {
 
     /// Indirect irradiance, if there is any.
     pub fn indirect(&self) -> Option<&Irradiance> {
-        self.indirect.as_ref().map(|i| &i.0)
+        self.indirect.as_ref().map(|i| &i.irradiance)
     }
 
     /// Bytes of this view, by resource.
@@ -621,9 +663,12 @@ impl ViewResources {
         if let Some((irradiance, own)) = &self.direct {
             list.push(("direct_irradiance", irradiance.memory_use() + own.memory_use()));
         }
-        if let Some((irradiance, own)) = &self.indirect {
-            list.push(("indirect_irradiance", irradiance.memory_use()));
-            list.push(("splatter", own.memory_use()));
+        if let Some(own) = &self.indirect {
+            list.push(("indirect_irradiance", own.irradiance.memory_use()));
+            list.push(("splatter", own.splatter.memory_use()));
+            if let Some((coarse, upsampler)) = &own.coarse {
+                list.push(("coarse_irradiance", coarse.memory_use() + upsampler.memory_use()));
+            }
         }
         list
     }

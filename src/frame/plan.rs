@@ -21,6 +21,8 @@ pub enum Stage {
     ImageSpaceTracer,
     /// Photons to irradiance.
     PhotonSplatter,
+    /// Irradiance of some pixels to all of them.
+    Upsampler,
     /// Photons by way of mirrors and glass.
     CausticPhotons,
     /// Penumbrae.
@@ -79,6 +81,7 @@ impl Plan {
         let stage = |stage, (on, reason): (bool, String)| PlannedStage { stage, on, reason };
         let always = |reason: &str| (true, reason.to_owned());
         let maps = (indirect.0, map_reason(&indirect, settings));
+        let upsampling = upsampling(&indirect, settings);
         Self {
             stages: vec![
                 stage(Stage::GBufferCapture, always("every view")),
@@ -88,6 +91,7 @@ impl Plan {
                 stage(Stage::PhotonEmitter, indirect.clone()),
                 stage(Stage::ImageSpaceTracer, indirect.clone()),
                 stage(Stage::PhotonSplatter, indirect),
+                stage(Stage::Upsampler, upsampling),
                 stage(Stage::CausticPhotons, (false, caustics)),
                 stage(Stage::SoftShadow, (false, soft)),
                 stage(Stage::Composite, always("every view")),
@@ -123,6 +127,15 @@ fn map_reason(indirect: &(bool, String), settings: &Settings) -> String {
         format!("{} maps of 6 × {}²", settings.env_map_count, settings.env_map_size)
     } else {
         indirect.1.clone()
+    }
+}
+
+fn upsampling(indirect: &(bool, String), settings: &Settings) -> (bool, String) {
+    let factor = settings.subsampling.factor();
+    match (indirect.0, factor) {
+        (false, _) => indirect.clone(),
+        (true, 1) => (false, "every pixel is estimated".to_owned()),
+        (true, _) => (true, format!("one pixel in {factor} × {factor} is estimated")),
     }
 }
 
@@ -166,6 +179,7 @@ impl fmt::Display for Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::resource::Subsampling;
     use crate::scene::SceneBounds;
     use glam::DVec3;
 
@@ -211,6 +225,20 @@ mod tests {
                 ..settings.clone()
             }
         ));
+    }
+
+    #[test]
+    fn upsampling_needs_indirect_light_and_pixels_that_are_left_out() {
+        let on = |lights, subsampling| {
+            let settings = Settings {
+                subsampling,
+                ..Settings::balanced()
+            };
+            Plan::for_scene(&SceneSummary { lights, ..summary() }, &settings).is_on(Stage::Upsampler)
+        };
+        assert!(on(1, Subsampling::Half));
+        assert!(!on(0, Subsampling::Half));
+        assert!(!on(1, Subsampling::Full));
     }
 
     #[test]

@@ -3,8 +3,9 @@
 use crate::Error;
 use crate::pass::{
     Bandwidth, EnvMapSelectorResources, EnvMapSelectorSettings, ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS,
-    MAX_SELECTED, PhotonSplatterConfig, PhotonSplatterSettings, SplatShape, TraceMethod,
+    MAX_SELECTED, PhotonSplatterConfig, PhotonSplatterSettings, SplatShape, TraceMethod, UpsamplerSettings,
 };
+use crate::resource::Subsampling;
 
 /// Most scatterings of a path.
 const MAX_BOUNCES: u32 = 64;
@@ -38,6 +39,10 @@ pub struct Settings {
     pub splatter_config: PhotonSplatterConfig,
     /// How wide: more photons under a kernel are smoother, blurrier and darker at edges.
     pub splatter: PhotonSplatterSettings,
+    /// At which pixels irradiance is estimated; the others are interpolated.
+    pub subsampling: Subsampling,
+    /// Between which pixels they are.
+    pub upsampler: UpsamplerSettings,
 }
 
 impl Default for Settings {
@@ -81,6 +86,8 @@ impl Settings {
             tracer: ImageSpaceTracerSettings::default(),
             splatter_config: PhotonSplatterConfig::default(),
             splatter: PhotonSplatterSettings::default(),
+            subsampling: Subsampling::Full,
+            upsampler: UpsamplerSettings::default(),
         }
     }
 
@@ -338,6 +345,27 @@ const KNOBS: &[Knob] = &[
         "above 0, up to 23 pixels",
         splatter.max_radius,
         |v| v > 0.0 && v <= LARGEST_RADIUS
+    ),
+    choice!(
+        "splatter.subsampling",
+        "1, 2, 4 or 8 (pixels for each sample, along an axis)",
+        subsampling,
+        ["1", Subsampling::Full],
+        ["2", Subsampling::Half],
+        ["4", Subsampling::Quarter],
+        ["8", Subsampling::Eighth]
+    ),
+    field!(
+        "upsampler.normal_agreement",
+        "below 1: a cosine",
+        upsampler.normal_agreement,
+        |v: f32| v < 1.0 && v.is_finite()
+    ),
+    field!(
+        "upsampler.plane_distance",
+        "above 0",
+        upsampler.plane_distance,
+        |v: f32| v > 0.0 && v.is_finite()
     ),
 ];
 

@@ -18,6 +18,7 @@ pub(crate) mod photon_splatter;
 mod shadow_map_capture;
 pub(crate) mod tone_map;
 pub(crate) mod trace_statistics;
+pub(crate) mod upsampler;
 
 pub use accumulator::{Accumulator, AccumulatorInputs, AccumulatorResources};
 pub use composite::{Composite, CompositeInputs, CompositeResources, CompositeSettings};
@@ -40,6 +41,7 @@ pub use photon_splatter::{
 pub use shadow_map_capture::{ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources};
 pub use tone_map::{ToneCurve, ToneMap, ToneMapInputs, ToneMapResources, ToneMapSettings};
 pub use trace_statistics::{HopStatistics, TraceStatistics, TraceStatisticsInputs, TraceStatisticsResources};
+pub use upsampler::{Upsampler, UpsamplerInputs, UpsamplerResources, UpsamplerSettings};
 
 /// Workgroups for `count` invocations of 64, and the invocations in a row of the dispatch.
 fn dispatch_64(count: u32) -> ([u32; 2], u32) {

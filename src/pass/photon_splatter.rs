@@ -1,6 +1,7 @@
 //! Density estimation: irradiance at each pixel from the photons around the surface point it sees.
 //!
-//! Inputs: [`Photons`], [`GBuffer`]. Output: [`Irradiance`]. E(x) = Σ Φ K(|x − x_p| / h) / h², K normalised over the unit
+//! Inputs: [`Photons`], [`GBuffer`]. Output: [`Irradiance`], at every pixel of the G-buffer or at a part of them
+//! ([`Subsampling`]). E(x) = Σ Φ K(|x − x_p| / h) / h², K normalised over the unit
 //! disc; photons straight from a light are left out, for direct light is shaded by itself. Sources: Yao et al. 2010,
 //! section 6; Yao et al., soft shadows and image-space photon mapping, section 3.3; Mara et al. 2013 (tiles).
 //!
@@ -10,7 +11,7 @@
 
 use super::dispatch_64;
 use crate::gpu::{self as device, BindGroupCache, Bound, ComputeSpec, RenderSpec, Slot};
-use crate::resource::{GBuffer, Irradiance, PHOTON_BYTES, Photons};
+use crate::resource::{GBuffer, Irradiance, PHOTON_BYTES, Photons, Subsampling};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -38,6 +39,7 @@ pub(crate) mod gpu {
         pub(crate) row: u32,
         pub(crate) max_radius: f32,
         pub(crate) capacity: u32,
+        pub(crate) factor: u32,
     }
 
     /// Twin of `Params` in `shaders/pass/photon_splatter/quads.wgsl`.
@@ -45,8 +47,12 @@ pub(crate) mod gpu {
     #[repr(C)]
     pub(crate) struct QuadParams {
         pub(crate) bandwidth: Bandwidth,
+        pub(crate) clip_scale: [f32; 2],
+        pub(crate) clip_shift: [f32; 2],
         pub(crate) first_slot: u32,
         pub(crate) max_radius: f32,
+        pub(crate) factor: u32,
+        pub(crate) _pad: u32,
     }
 
     /// Twin of `Splat` in `tiled.wgsl`.
@@ -111,7 +117,8 @@ pub enum SplatShape {
     /// Photons are binned to screen tiles and gathered in f32: any number of photons a pixel, the same bits every frame.
     #[default]
     Tiled,
-    /// Blended quads, the baseline. Sums in `rgba16float` lose about a percent at a hundred photons a pixel and stagnate
+    /// Blended quads, the baseline. Where the size of the G-buffer is no multiple of a sub-sampling factor, the last row
+    /// or column of samples stands up to half a block nearer than quads are drawn for, and misses a rim of them. Sums in `rgba16float` lose about a percent at a hundred photons a pixel and stagnate
     /// above a thousand; where the device has `FLOAT32_BLENDABLE`, an `rgba32float` target does not.
     Quads,
 }
@@ -169,7 +176,8 @@ impl PhotonSplatterConfig {
 pub struct PhotonSplatterSettings {
     /// Kernel radius.
     pub bandwidth: Bandwidth,
-    /// Widest kernel radius in pixels, up to 23: bounds the cost of a photon near the eye.
+    /// Widest kernel radius in pixels of the irradiance, up to 23: bounds the cost of a photon near the eye. Where
+    /// irradiance is sub-sampled, kernels may thus be wider by the factor.
     pub max_radius: f32,
 }
 
@@ -211,7 +219,7 @@ struct TiledPipelines {
     gather: wgpu::ComputePipeline,
 }
 
-/// Working memory for one view.
+/// Working memory for one view, made for the size of its irradiance.
 #[derive(Debug)]
 pub struct PhotonSplatterResources {
     params: wgpu::Buffer,
@@ -239,7 +247,9 @@ pub struct PhotonSplatterInputs<'a> {
     pub photons: &'a Photons,
     /// Where it may land. Its view must be set.
     pub g_buffer: &'a GBuffer,
-    /// Written; of the G-buffer's size and [`PhotonSplatterConfig::format`].
+    /// Which of its pixels are estimated.
+    pub subsampling: Subsampling,
+    /// Written; [`PhotonSplatterConfig::format`], of the size that [`Subsampling::size`] makes of the G-buffer's.
     pub irradiance: &'a Irradiance,
     /// Area of all surfaces, unit-frame lengths squared; sets the uniform density.
     pub area: f32,
@@ -326,7 +336,8 @@ impl PhotonSplatter {
             return;
         };
         let slots = splatted_slots(inputs.photons).min(working.slots);
-        let size = inputs.g_buffer.size();
+        let size = inputs.subsampling.size(inputs.g_buffer.size());
+        let factor = inputs.subsampling.factor();
         let tiles = tiles_of([size[0].min(working.size[0]), size[1].min(working.size[1])]);
         let (groups, row) = dispatch_64(slots);
         let params = gpu::TiledParams {
@@ -335,8 +346,9 @@ impl PhotonSplatter {
             tile_columns: tiles[0],
             tile_rows: tiles[1],
             row,
-            max_radius: inputs.settings.max_radius.clamp(0.0, LARGEST_RADIUS),
+            max_radius: inputs.settings.max_radius.clamp(0.0, LARGEST_RADIUS) * factor as f32,
             capacity: (working.list.size() / 4) as u32,
+            factor,
             bandwidth: bandwidth(inputs),
         };
         inputs
@@ -384,10 +396,17 @@ impl PhotonSplatter {
         inputs: &PhotonSplatterInputs<'_>,
     ) {
         let slots = splatted_slots(inputs.photons);
+        let factor = inputs.subsampling.factor();
+        let [x, y] = clip_maps(inputs.subsampling, inputs.g_buffer.size());
         let params = gpu::QuadParams {
             bandwidth: bandwidth(inputs),
+            clip_scale: [x[0], y[0]],
+            // Clip space has +y up, pixels have it down.
+            clip_shift: [x[1], -y[1]],
             first_slot: inputs.photons.count(),
-            max_radius: inputs.settings.max_radius,
+            max_radius: inputs.settings.max_radius * factor as f32,
+            factor,
+            _pad: 0,
         };
         inputs
             .queue
@@ -412,7 +431,7 @@ impl PhotonSplatter {
 }
 
 impl PhotonSplatterResources {
-    /// Bytes of working memory for photon buffers of `slots` slots and G-buffers of `size`.
+    /// Bytes of working memory for photon buffers of `slots` slots and irradiance of `size`.
     pub fn size_in_bytes(config: &PhotonSplatterConfig, slots: u32, size: [u32; 2]) -> u64 {
         match config.shape {
             SplatShape::Tiled => working_sizes(slots, size).iter().sum::<u64>() + size_of::<gpu::TiledParams>() as u64,
@@ -434,7 +453,8 @@ impl PhotonSplatterResources {
         device::check_buffer(device, "lightfall::PhotonSplatter::list", largest, usage)
     }
 
-    /// Working memory for this many photons and this size of G-buffer.
+    /// Working memory for this many photons and irradiance of this size: the G-buffer's, or what [`Subsampling::size`]
+    /// makes of it.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`].
@@ -508,6 +528,18 @@ fn splatted_slots(photons: &Photons) -> u32 {
     let slots = photons.slots() - photons.count();
     debug_assert!(photons.buffer().size() >= u64::from(photons.slots()) * PHOTON_BYTES);
     slots
+}
+
+/// Scale and shift, by axis, that take the clip space of an image to that of its samples: pixel i of them is pixel
+/// f i + ⌊f/2⌋ of the image, so that a point x pixels from its left lies (x − s) / f from theirs, s = ⌊f/2⌋ + 1/2 − f/2.
+fn clip_maps(subsampling: Subsampling, full: [u32; 2]) -> [[f32; 2]; 2] {
+    let factor = subsampling.factor();
+    let shift = f64::from(factor / 2) + 0.5 - 0.5 * f64::from(factor);
+    let samples = subsampling.size(full);
+    [0, 1].map(|axis| {
+        let (full, span) = (f64::from(full[axis]), f64::from(factor * samples[axis]));
+        [(full / span) as f32, ((full - 2.0 * shift) / span - 1.0) as f32]
+    })
 }
 
 fn bandwidth(inputs: &PhotonSplatterInputs<'_>) -> gpu::Bandwidth {

@@ -3,8 +3,46 @@
 use super::expect_view;
 use crate::{Error, gpu};
 
-/// Irradiance, W/m² in the unit frame, RGB; alpha is unused. `rgba32float`, or a coarser format where
-/// a pass says so.
+/// At which pixels of a G-buffer irradiance is estimated: all, or one in a block of so many along each axis, from which
+/// [`Upsampler`](crate::pass::Upsampler) makes the others. Wider saves time as the square and loses what is finer than a
+/// block.
+///
+/// Sample (i, j) stands on pixel (f i + ⌊f/2⌋, f j + ⌊f/2⌋) of the part of the G-buffer in use, f the factor, or on its
+/// last pixel where that lies outside.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Subsampling {
+    /// Every pixel.
+    #[default]
+    Full = 1,
+    /// One of 2 × 2.
+    Half = 2,
+    /// One of 4 × 4.
+    Quarter = 4,
+    /// One of 8 × 8.
+    Eighth = 8,
+}
+
+impl Subsampling {
+    /// Pixels for each sample along an axis.
+    pub fn factor(self) -> u32 {
+        self as u32
+    }
+
+    /// Samples of an image of this size, rounded up: every block has one.
+    pub fn size(self, full: [u32; 2]) -> [u32; 2] {
+        full.map(|length| length.div_ceil(self.factor()))
+    }
+
+    /// The pixel of an image of this size that a sample stands on. Twin of `subsampling_pixel` in
+    /// `shaders/common/subsampling.wgsl`.
+    pub fn pixel(self, sample: [u32; 2], full: [u32; 2]) -> [u32; 2] {
+        let factor = self.factor();
+        [0, 1].map(|axis| (sample[axis] * factor + factor / 2).min(full[axis].saturating_sub(1)))
+    }
+}
+
+/// Irradiance, W/m² in the unit frame, RGB. Alpha is not light: the pass that writes it says what it holds.
+/// `rgba32float`, or a coarser format where a pass says so.
 #[derive(Debug)]
 pub struct Irradiance {
     view: wgpu::TextureView,

@@ -19,7 +19,7 @@ pub use env_maps::EnvMaps;
 pub(crate) use env_maps::SURFACE_FORMAT;
 pub use g_buffer::{GBuffer, GBufferViews, NormalEncoding};
 pub use geometry::{CaptureTargets, Geometry, PrepareContext};
-pub use irradiance::Irradiance;
+pub use irradiance::{Irradiance, Subsampling};
 pub use lights::{Lights, MAX_LIGHTS};
 pub use mesh_geometry::MeshGeometry;
 pub use photons::{PHOTON_BYTES, Photon, PhotonState, Photons};

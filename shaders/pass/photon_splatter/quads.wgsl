@@ -3,10 +3,15 @@
 
 struct Params {
     bandwidth: Bandwidth,
+    // From clip space of the G-buffer to that of the irradiance
+    clip_scale: vec2f,
+    clip_shift: vec2f,
     // First slot of the photon buffer to read
     first_slot: u32,
-    // Largest radius in pixels
+    // Largest radius in pixels of the G-buffer
     max_radius: f32,
+    // Pixels of the G-buffer for each one of the irradiance, along each axis
+    factor: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -45,6 +50,7 @@ fn vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) index: u3
     let frame = sampling_frame(normal);
     let p = photon.position + QUAD_MARGIN * radius * (side.x * frame[0] + side.y * frame[1]);
     var clip = m * vec4f(p, 1.0);
+    clip = vec4f(params.clip_scale * clip.xy + params.clip_shift * clip.w, clip.zw);
     // The near plane must not cut a quad whose receivers it cannot cut.
     clip.z = 0.5 * clip.w;
     return Quad(clip, photon.position, radius, photon.flux, normal);
@@ -52,7 +58,7 @@ fn vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) index: u3
 
 @fragment
 fn fragment(quad: Quad) -> @location(0) vec4f {
-    let pixel = vec2u(quad.clip.xy);
+    let pixel = subsampling_pixel(vec2u(quad.clip.xy), params.factor, view.size);
     let at = pixel + view.origin;
     if textureLoad(base_color_texture, at, 0).a <= 0.0 || quad.radius <= 0.0 {
         discard;

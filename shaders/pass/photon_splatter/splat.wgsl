@@ -66,18 +66,14 @@ fn splat_position(view: View, pixel: vec2i) -> vec3f {
     return g_buffer_position(view, vec2f(pixel), textureLoad(depth_texture, at, 0).r);
 }
 
-// Geometric normal at a pixel: from depth where the nearer neighbours lie on one surface, else the shading normal.
+// Geometric normal at a pixel, from its neighbours at full resolution.
 fn splat_receiver_normal(view: View, pixel: vec2i, p: vec3f, shading: vec3f) -> vec3f {
     let limit = vec2i(view.size) - 1;
-    let x0 = p - splat_position(view, vec2i(max(pixel.x - 1, 0), pixel.y));
-    let x1 = splat_position(view, vec2i(min(pixel.x + 1, limit.x), pixel.y)) - p;
-    let y0 = p - splat_position(view, vec2i(pixel.x, max(pixel.y - 1, 0)));
-    let y1 = splat_position(view, vec2i(pixel.x, min(pixel.y + 1, limit.y))) - p;
-    let use_x1 = pixel.x == 0 || (pixel.x < limit.x && dot(x1, x1) < dot(x0, x0));
-    let use_y1 = pixel.y == 0 || (pixel.y < limit.y && dot(y1, y1) < dot(y0, y0));
-    let n = cross(select(x0, x1, use_x1), select(y0, y1, use_y1));
-    let length_squared = dot(n, n);
-    let unit = n * inverseSqrt(max(length_squared, 0x1p-126));
-    let facing = select(-unit, unit, dot(unit, shading) > 0.0);
-    return select(shading, facing, length_squared > 0x1p-120 && dot(facing, shading) > SPLAT_NORMAL_AGREEMENT);
+    let around = Neighbours(
+        splat_position(view, vec2i(max(pixel.x - 1, 0), pixel.y)),
+        splat_position(view, vec2i(min(pixel.x + 1, limit.x), pixel.y)),
+        splat_position(view, vec2i(pixel.x, max(pixel.y - 1, 0))),
+        splat_position(view, vec2i(pixel.x, min(pixel.y + 1, limit.y))),
+    );
+    return g_buffer_geometric_normal(view, pixel, p, around, shading);
 }

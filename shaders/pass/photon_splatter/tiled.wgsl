@@ -12,10 +12,12 @@ struct Params {
     tile_columns: u32,
     tile_rows: u32,
     row: u32,
-    // Largest radius in pixels
+    // Largest radius in pixels of the G-buffer
     max_radius: f32,
     // Capacity of the tile lists
     capacity: u32,
+    // Pixels of the G-buffer for each one of the irradiance, along each axis
+    factor: u32,
 }
 
 struct Splat {
@@ -73,14 +75,24 @@ fn projected_range(row: vec4f, w_row: vec4f, c: vec3f, h: f32) -> vec2f {
     return vec2f(qb - root, qb + root) / qa;
 }
 
-// First and last pixel that the ball touches: x0, y0, x1, y1; x1 < x0 or y1 < y0 where it touches none.
+fn irradiance_size() -> vec2u {
+    return subsampling_size(view.size, params.factor);
+}
+
+// First and last pixel of the irradiance that the ball touches: x0, y0, x1, y1; x1 < x0 or y1 < y0 where it touches none.
 fn pixel_range(c: vec3f, h: f32) -> vec4i {
     let x = projected_range(matrix_row(0u), matrix_row(3u), c, h);
     let y = projected_range(matrix_row(1u), matrix_row(3u), c, h);
-    let size = vec2f(view.size);
-    // A pixel of slack for rounding: one too many costs nothing but time.
-    let low = vec2f(0.5 + 0.5 * x.x, 0.5 - 0.5 * y.y) * size - 1.0;
-    let high = vec2f(0.5 + 0.5 * x.y, 0.5 - 0.5 * y.x) * size + 1.0;
+    let full = vec2f(view.size);
+    // The centre of pixel i of the irradiance, i + 1/2, is that of pixel factor i + factor / 2, rounded down, of the
+    // G-buffer.
+    let factor = f32(params.factor);
+    let shift = f32(params.factor / 2u) + 0.5 - 0.5 * factor;
+    // A pixel of slack for rounding, and for the last ones, which the rim holds back by less than that: one too many
+    // costs nothing but time.
+    let low = (vec2f(0.5 + 0.5 * x.x, 0.5 - 0.5 * y.y) * full - shift) / factor - 1.0;
+    let high = (vec2f(0.5 + 0.5 * x.y, 0.5 - 0.5 * y.x) * full - shift) / factor + 1.0;
+    let size = vec2f(irradiance_size());
     return vec4i(vec4f(clamp(floor(low), vec2f(0.0), size), clamp(floor(high), vec2f(-1.0), size - 1.0)));
 }
 
@@ -253,7 +265,8 @@ fn mark_blocks(tile_corner: vec2i, range: vec4i, place: u32) {
     }
 }
 
-// Positions and geometric normals of an invocation's four pixels, by coordinate; `seen` where there is a surface.
+// Positions and geometric normals at an invocation's four pixels of the irradiance, by coordinate; `seen` where there is
+// a surface.
 struct Receivers {
     x: vec4f,
     y: vec4f,
@@ -271,8 +284,9 @@ fn receiver_pixel(corner: vec2u, i: u32) -> vec2u {
 fn receivers_at(corner: vec2u) -> Receivers {
     var receivers: Receivers;
     for (var i = 0u; i < 4u; i++) {
-        let pixel = receiver_pixel(corner, i);
-        if any(pixel >= view.size) || textureLoad(base_color_texture, pixel + view.origin, 0).a <= 0.0 {
+        let index = receiver_pixel(corner, i);
+        let pixel = subsampling_pixel(index, params.factor, view.size);
+        if any(index >= irradiance_size()) || textureLoad(base_color_texture, pixel + view.origin, 0).a <= 0.0 {
             continue;
         }
         let p = splat_position(view, vec2i(pixel));
@@ -354,7 +368,7 @@ fn gather_tiles(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
     let b = f32_from_64(blue) * from_quanta;
     for (var i = 0u; i < 4u; i++) {
         let pixel = receiver_pixel(corner, i);
-        if all(pixel < view.size) {
+        if all(pixel < irradiance_size()) {
             textureStore(irradiance, pixel, vec4f(r[i], g[i], b[i], 1.0));
         }
     }

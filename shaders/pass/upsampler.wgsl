@@ -1,0 +1,173 @@
+// Irradiance at every pixel from samples at a part of them: joint bilateral interpolation (Yao et al., soft shadows and
+// image-space photon mapping, section 3.5), with the distance from the receiver's tangent plane in the place of depth.
+
+struct Params {
+    factor: u32,
+    // Cosine at and below which normals do not agree
+    normal_agreement: f32,
+    // Distance from the receiver's plane that counts as off it, in receiver-to-sample distances as seen on the screen
+    plane_distance: f32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> view: View;
+@group(0) @binding(2) var depth_texture: texture_2d<f32>;
+@group(0) @binding(3) var normal_texture: texture_2d<f32>;
+@group(0) @binding(4) var base_color_texture: texture_2d<f32>;
+@group(0) @binding(5) var coarse: texture_2d<f32>;
+@group(0) @binding(6) var irradiance: texture_storage_2d<rgba32float, write>;
+
+// Positions come from f32 depths through an f32 matrix: some ten roundings of 2^-24 of the numbers involved, which are of
+// the order of the region's radius (at most 1) or of the distance to the eye.
+const ROUNDING: f32 = 0x1p-20;
+// Misfits of samples without a surface, and of those whose misfit is no number.
+const UNSEEN: f32 = 3e38;
+const WORST: f32 = 1e38;
+
+// A pixel and the surface element that it sees.
+struct Receiver {
+    pixel: vec2u,
+    position: vec3f,
+    shading: vec3f,
+    // Geometric normal
+    normal: vec3f,
+    // Clip space w: distance along the axis of a perspective, else 1
+    w: f32,
+    // Width of a pixel at its distance
+    pixel_width: f32,
+}
+
+// What a sample says, and how well it fits a receiver.
+struct Sample {
+    irradiance: vec3f,
+    // Factor on its screen-space weight, 0 where it does not fit
+    fit: f32,
+    // 0 on the same plane; orders the samples where none fits
+    misfit: f32,
+}
+
+struct Mean {
+    value: vec3f,
+    weight: f32,
+}
+
+// Updated, not summed and divided: equal values stay what they are to the bit.
+fn mean_with(mean: Mean, value: vec3f, weight: f32) -> Mean {
+    if !(weight > 0.0) {
+        return mean;
+    }
+    if mean.weight <= 0.0 {
+        return Mean(value, weight);
+    }
+    let total = mean.weight + weight;
+    // A quotient that is rounded up must not overshoot: irradiance would turn negative.
+    return Mean(mean.value + min(1.0, weight / total) * (value - mean.value), total);
+}
+
+fn matrix_row(i: u32) -> vec4f {
+    let m = view.view_projection;
+    return vec4f(m[0][i], m[1][i], m[2][i], m[3][i]);
+}
+
+fn position_at(pixel: vec2u) -> vec3f {
+    return g_buffer_position(view, vec2f(pixel), textureLoad(depth_texture, pixel + view.origin, 0).r);
+}
+
+fn shading_normal_at(pixel: vec2u) -> vec3f {
+    return g_buffer_normal(view, textureLoad(normal_texture, pixel + view.origin, 0));
+}
+
+fn is_surface(pixel: vec2u) -> bool {
+    return textureLoad(base_color_texture, pixel + view.origin, 0).a > 0.0;
+}
+
+fn receiver_at(pixel: vec2u) -> Receiver {
+    let limit = view.size - 1u;
+    let p = position_at(pixel);
+    let shading = shading_normal_at(pixel);
+    let around = Neighbours(
+        position_at(vec2u(max(pixel.x, 1u) - 1u, pixel.y)),
+        position_at(vec2u(min(pixel.x + 1u, limit.x), pixel.y)),
+        position_at(vec2u(pixel.x, max(pixel.y, 1u) - 1u)),
+        position_at(vec2u(pixel.x, min(pixel.y + 1u, limit.y))),
+    );
+    let normal = g_buffer_geometric_normal(view, vec2i(pixel), p, around, shading);
+    let w = dot(matrix_row(3u), vec4f(p, 1.0));
+    let x_scale = length(matrix_row(0u).xyz) * f32(view.size.x);
+    let y_scale = length(matrix_row(1u).xyz) * f32(view.size.y);
+    return Receiver(pixel, p, shading, normal, w, 2.0 * w / max(x_scale, y_scale));
+}
+
+// The sample of this index as the receiver sees it.
+fn sample_for(receiver: Receiver, index: vec2u) -> Sample {
+    let pixel = subsampling_pixel(index, params.factor, view.size);
+    if !is_surface(pixel) {
+        return Sample(vec3f(0.0), 0.0, UNSEEN);
+    }
+    let p = position_at(pixel);
+    let turned = (1.0 - dot(shading_normal_at(pixel), receiver.shading)) / (1.0 - params.normal_agreement);
+    // Not in units of the distance between both points: seen at a grazing angle, that is long where the plane is left by
+    // little, as from the top of a box to the floor behind it. On the plane itself the angle of view cancels out.
+    let distance = receiver.pixel_width * length(vec2f(pixel) - vec2f(receiver.pixel));
+    let off_plane = abs(dot(p - receiver.position, receiver.normal));
+    let lifted = off_plane / (params.plane_distance * distance + ROUNDING * (1.0 + receiver.w));
+    let misfit = turned + lifted;
+    // What is linear on a plane in space is linear on the screen only over w: weights of 1 / w interpolate it exactly.
+    let perspective = receiver.w / dot(matrix_row(3u), vec4f(p, 1.0));
+    let fit = perspective * max(0.0, 1.0 - turned) * max(0.0, 1.0 - lifted);
+    return Sample(textureLoad(coarse, index, 0).rgb, fit, select(WORST, misfit, misfit < WORST));
+}
+
+@compute @workgroup_size(8, 8)
+fn upsample_pixels(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= min(view.size, textureDimensions(irradiance))) {
+        return;
+    }
+    if !is_surface(id.xy) {
+        textureStore(irradiance, id.xy, vec4f(0.0));
+        return;
+    }
+    let receiver = receiver_at(id.xy);
+    let factor = i32(params.factor);
+    let last = vec2i(min(subsampling_size(view.size, params.factor), textureDimensions(coarse))) - 1;
+    // The four samples around the pixel. The last ones of an axis may stand closer; outside the outermost, they count alone.
+    let pixel = vec2i(id.xy);
+    let low = clamp((pixel - factor / 2 + factor) / factor - 1, vec2i(0), last);
+    let high = min(low + 1, last);
+    let start = vec2i(subsampling_pixel(vec2u(low), params.factor, view.size));
+    let end = vec2i(subsampling_pixel(vec2u(high), params.factor, view.size));
+    let t = clamp(vec2f(pixel - start) / vec2f(max(end - start, vec2i(1))), vec2f(0.0), vec2f(1.0));
+    var mean = Mean();
+    for (var i = 0; i < 4; i++) {
+        let right_or_below = vec2<bool>((i & 1) == 1, (i & 2) == 2);
+        let share = select(1.0 - t, t, right_or_below);
+        if share.x * share.y > 0.0 {
+            let s = sample_for(receiver, vec2u(select(low, high, right_or_below)));
+            mean = mean_with(mean, s.irradiance, share.x * share.y * s.fit);
+        }
+    }
+    if mean.weight > 0.0 {
+        textureStore(irradiance, id.xy, vec4f(mean.value, 1.0));
+        return;
+    }
+    // None of them fits: the sixteen around, falling off linearly to twice the distance between samples.
+    var best = Sample(vec3f(0.0), 0.0, UNSEEN);
+    for (var i = 0; i < 16; i++) {
+        let index = low + vec2i(i % 4, i / 4) - 1;
+        if any(index < vec2i(0)) || any(index > last) {
+            continue;
+        }
+        let s = sample_for(receiver, vec2u(index));
+        let at = vec2i(subsampling_pixel(vec2u(index), params.factor, view.size));
+        let share = max(vec2f(0.0), 2.0 - vec2f(abs(pixel - at)) / f32(factor));
+        mean = mean_with(mean, s.irradiance, share.x * share.y * s.fit);
+        if s.misfit < best.misfit {
+            best = s;
+        }
+    }
+    if mean.weight > 0.0 {
+        textureStore(irradiance, id.xy, vec4f(mean.value, 1.0));
+    } else {
+        textureStore(irradiance, id.xy, vec4f(best.irradiance, 0.0));
+    }
+}

@@ -1,0 +1,179 @@
+//! Up-sampling: irradiance at every pixel from an estimate at a part of them.
+//!
+//! Inputs: [`GBuffer`], coarse [`Irradiance`] of some [`Subsampling`]. Output: [`Irradiance`] (`rgba32float`) of the
+//! G-buffer's size. Source: Yao et al., soft shadows and image-space photon mapping, section 3.5 (joint bilateral
+//! interpolation between the four samples around a pixel).
+//!
+//! A sample weighs as in bilinear interpolation, times how well its normal agrees, times how near it lies to the
+//! receiver's tangent plane. That plane stands for the paper's difference of depth, which a slanted floor has by itself.
+//! Distance from it is measured in distances on the screen between receiver and sample, brought to the receiver's depth,
+//! so that scale and angle of view play no part. Weights are over clip-space w: what is linear on a plane is reproduced
+//! exactly, in any view. Where none of the four fits, the sixteen around are tried; where none of those does, the
+//! best-fitting one is taken as it is, and alpha says so.
+//!
+//! Alpha of the output: 1 where samples fit, 0 where none did or where no surface is seen. There RGB is 0 as well, and
+//! where all sixteen samples miss every surface.
+//!
+//! Cost: pixels, whatever the factor; some thirty texel fetches each. Limits: detail finer than a block is lost, contact
+//! shadows among it; things that no sample sees take the colour of the best-fitting surface beside them; beyond the
+//! outermost samples the outermost counts alone.
+
+use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
+use crate::resource::{GBuffer, Irradiance, Subsampling};
+use crate::{Error, Timestamps, wgsl};
+
+pub(crate) mod gpu {
+    use bytemuck::{Pod, Zeroable};
+
+    /// Twin of `Params` in `shaders/pass/upsampler.wgsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Params {
+        pub(crate) factor: u32,
+        pub(crate) normal_agreement: f32,
+        pub(crate) plane_distance: f32,
+    }
+}
+
+/// Bindings of `shaders/pass/upsampler.wgsl`, in order.
+pub(crate) const SLOTS: [Slot; 7] = [
+    Slot::Uniform,
+    Slot::Uniform,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
+];
+
+/// Which samples a pixel takes. Neither field costs time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UpsamplerSettings {
+    /// Cosine between the shading normals of pixel and sample at and below which the sample is left out, below 1; its
+    /// weight rises linearly to 1 where they agree. Higher keeps the sides of an edge apart at flatter edges; lower finds
+    /// samples on surfaces that are strongly curved.
+    pub normal_agreement: f32,
+    /// How far off the pixel's tangent plane a sample is left out, above 0, as a share of the distance between both as
+    /// seen on the screen; its weight falls linearly to there. Lower keeps thinner steps apart; higher finds samples on
+    /// surfaces that are curved away from the eye.
+    pub plane_distance: f32,
+}
+
+impl Default for UpsamplerSettings {
+    /// 45° lets neighbouring facets share light and keeps the walls of a corner apart, as in density estimation.
+    fn default() -> Self {
+        Self {
+            normal_agreement: 0.7,
+            plane_distance: 0.5,
+        }
+    }
+}
+
+/// The pass.
+#[derive(Debug)]
+pub struct Upsampler {
+    device: wgpu::Device,
+    layout: wgpu::BindGroupLayout,
+    upsample: wgpu::ComputePipeline,
+}
+
+/// Uniforms and bind groups for one view.
+#[derive(Debug)]
+pub struct UpsamplerResources {
+    params: wgpu::Buffer,
+    groups: BindGroupCache,
+}
+
+/// What a frame gives it.
+#[derive(Debug, Clone, Copy)]
+pub struct UpsamplerInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// Surfaces to light. Its view must be set.
+    pub g_buffer: &'a GBuffer,
+    /// The estimate, in any format of [`Irradiance::FORMATS`], of the size that [`Subsampling::size`] makes of the
+    /// G-buffer's. Of another size, what both have is used.
+    pub coarse: &'a Irradiance,
+    /// Where its samples stand.
+    pub subsampling: Subsampling,
+    /// Written; `rgba32float` of the G-buffer's size.
+    pub irradiance: &'a Irradiance,
+    /// Which samples to take.
+    pub settings: &'a UpsamplerSettings,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+impl Upsampler {
+    /// The pass on this device. Needs no features and no more than default limits.
+    pub fn new(device: &wgpu::Device) -> Self {
+        let layout = device::layout(device, "lightfall::Upsampler", wgpu::ShaderStages::COMPUTE, &SLOTS);
+        let upsample = device::compute_pipeline(
+            device,
+            &ComputeSpec {
+                label: "lightfall::Upsampler::upsample",
+                source: wgsl::UPSAMPLER,
+                entry_point: "upsample_pixels",
+                layouts: &[&layout],
+                constants: &[],
+            },
+        );
+        Self {
+            device: device.clone(),
+            layout,
+            upsample,
+        }
+    }
+
+    /// Records the interpolation.
+    pub fn record(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut UpsamplerResources,
+        inputs: &UpsamplerInputs<'_>,
+    ) {
+        let params = gpu::Params {
+            factor: inputs.subsampling.factor(),
+            normal_agreement: inputs.settings.normal_agreement,
+            plane_distance: inputs.settings.plane_distance,
+        };
+        inputs
+            .queue
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        let views = inputs.g_buffer.views();
+        let bound = [
+            (&resources.params).into(),
+            inputs.g_buffer.view_buffer().into(),
+            (&views.depth).into(),
+            (&views.normal).into(),
+            (&views.base_color).into(),
+            inputs.coarse.view().into(),
+            inputs.irradiance.view().into(),
+        ];
+        let label = "lightfall::Upsampler";
+        let group = resources.groups.get(&self.device, label, &self.layout, &bound);
+        let [width, height] = inputs.g_buffer.size();
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(&self.upsample);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(width.div_ceil(8), height.div_ceil(8), 1);
+    }
+}
+
+impl UpsamplerResources {
+    /// Resources on this device.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] if the device grants next to nothing.
+    pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
+        Ok(Self {
+            params: device::uniform_buffer::<gpu::Params>(device, "lightfall::Upsampler::params")?,
+            groups: BindGroupCache::default(),
+        })
+    }
+
+    /// Bytes allocated.
+    pub fn memory_use(&self) -> u64 {
+        self.params.size()
+    }
+}
