@@ -109,7 +109,10 @@ fn sample_for(receiver: Receiver, index: vec2u) -> Sample {
     // Not in units of the distance between both points: seen at a grazing angle, that is long where the plane is left by
     // little, as from the top of a box to the floor behind it. On the plane itself the angle of view cancels out.
     let distance = receiver.pixel_width * length(vec2f(pixel) - vec2f(receiver.pixel));
-    let off_plane = abs(dot(p - receiver.position, receiver.normal));
+    // The geometric normal is right where normals are mapped, the shading normal where a crease runs between a pixel's
+    // neighbours.
+    let apart = p - receiver.position;
+    let off_plane = min(abs(dot(apart, receiver.normal)), abs(dot(apart, receiver.shading)));
     let lifted = off_plane / (params.plane_distance * distance + ROUNDING * (1.0 + receiver.w));
     let misfit = turned + lifted;
     // What is linear on a plane in space is linear on the screen only over w: weights of 1 / w interpolate it exactly.
