@@ -191,6 +191,8 @@ pub(crate) enum Slot {
     FilteredTexture,
     /// `texture_2d<u32>`.
     UintTexture,
+    /// `texture_2d_array<f32>`, read by `textureLoad` only.
+    TextureArray,
     /// `texture_2d_array<u32>`.
     UintArray,
     /// `texture_storage_2d<.., write>`.
@@ -230,6 +232,7 @@ pub(crate) fn layout(
                 Slot::Texture => texture(wgpu::TextureSampleType::Float { filterable: false }, flat),
                 Slot::FilteredTexture => texture(wgpu::TextureSampleType::Float { filterable: true }, flat),
                 Slot::UintTexture => texture(wgpu::TextureSampleType::Uint, flat),
+                Slot::TextureArray => texture(wgpu::TextureSampleType::Float { filterable: false }, array),
                 Slot::UintArray => texture(wgpu::TextureSampleType::Uint, array),
                 Slot::StorageTexture(format) => wgpu::BindingType::StorageTexture {
                     access: wgpu::StorageTextureAccess::WriteOnly,
@@ -286,15 +289,30 @@ impl From<&wgpu::Buffer> for Bound {
 }
 
 /// Bind groups remembered by what they bind, so that a settled frame creates none.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(crate) struct BindGroupCache {
     groups: Vec<(Vec<Bound>, wgpu::BindGroup)>,
+    capacity: usize,
 }
 
 /// A host that swaps between more than this many views of the same seam pays for a new bind group now and then.
 const CACHED_BIND_GROUPS: usize = 8;
 
+impl Default for BindGroupCache {
+    fn default() -> Self {
+        Self::for_uses(1)
+    }
+}
+
 impl BindGroupCache {
+    /// For a pass that binds `uses` different groups of one layout in a frame.
+    pub(crate) fn for_uses(uses: usize) -> Self {
+        Self {
+            groups: Vec::new(),
+            capacity: CACHED_BIND_GROUPS * uses.max(1),
+        }
+    }
+
     /// The bind group of these resources, made now if it is not remembered.
     pub(crate) fn get(
         &mut self,
@@ -314,7 +332,7 @@ impl BindGroupCache {
             })
             .collect();
         let group = bind_group(device, label, layout, resources);
-        if self.groups.len() == CACHED_BIND_GROUPS {
+        if self.groups.len() == self.capacity {
             self.groups.remove(0);
         }
         self.groups.push((bound.to_vec(), group.clone()));

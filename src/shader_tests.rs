@@ -3,8 +3,8 @@
 
 use crate::gpu::Slot;
 use crate::pass::{
-    accumulator, composite, direct_light, env_map_selector, image_space_tracer, photon_emitter, photon_splatter,
-    tone_map, trace_statistics, upsampler,
+    accumulator, composite, direct_light, env_map_selector, image_space_tracer, nearest_occluder, photon_emitter,
+    photon_splatter, soft_shadow, tone_map, trace_statistics, upsampler,
 };
 use crate::resource::{Photon, PhotonState, g_buffer, lights, mesh_geometry, view};
 use crate::wgsl;
@@ -210,7 +210,7 @@ fn twins() -> Vec<Twin> {
         }),
         twin!(wgsl::DIRECT_LIGHT, "Light", lights::gpu::LightRecord {
             position, kind, direction, inner, intensity, outer, right, first_layer, up, layer_count, photon_flux,
-            half_extent, first_photon, photon_count, density, disc_radius,
+            half_extent, first_photon, photon_count, density, disc_radius, extent, _pad,
         }),
         twin!(wgsl::PHOTON_EMITTER, "Photon", Photon {
             position, state, flux, density, normal, direction, reflectance, light,
@@ -241,6 +241,12 @@ fn twins() -> Vec<Twin> {
         }),
         twin!(wgsl::UPSAMPLER, "Params", upsampler::gpu::Params { factor, normal_agreement, plane_distance }),
         twin!(wgsl::DIRECT_LIGHT, "Params", direct_light::gpu::Params { light_count, shadow_map_size }),
+        twin!(wgsl::NEAREST_OCCLUDER, "Params", nearest_occluder::gpu::Params {
+            light_count, shadow_map_size, layer_count,
+        }),
+        twin!(wgsl::SOFT_SHADOW_BLUR, "Params", soft_shadow::gpu::Params {
+            light, shadow_map_size, layer_count, search, search_taps, blur_taps, max_radius, range_scale,
+        }),
         twin!(wgsl::COMPOSITE, "Params", composite::gpu::Params {
             output_scale, direct_weight, indirect_weight, emission_weight,
         }),
@@ -354,8 +360,12 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "ImageSpaceTracer" => vec![&image_space_tracer::SLOTS],
         "PhotonSplatter tiled" => vec![&photon_splatter::TILED_SLOTS],
         "PhotonSplatter quads" => vec![&photon_splatter::QUAD_SLOTS],
+        "DirectLight" => vec![&direct_light::SLOTS, &direct_light::VISIBILITY_SLOTS],
+        "NearestOccluder" => vec![&nearest_occluder::SLOTS],
+        "SoftShadow test" => vec![&soft_shadow::TEST_SLOTS],
+        "SoftShadow search" => vec![&soft_shadow::SEARCH_SLOTS],
+        "SoftShadow blur" => vec![&soft_shadow::BLUR_SLOTS],
         "Upsampler" => vec![&upsampler::SLOTS],
-        "DirectLight" => vec![&direct_light::SLOTS],
         "Composite" => vec![&composite::SLOTS],
         "Accumulator" => vec![&accumulator::SLOTS],
         "ToneMap" => vec![&tone_map::SLOTS],
@@ -374,6 +384,7 @@ fn kind_of_slot(slot: Slot) -> String {
         Slot::StorageMut => "var<storage, read_write>".into(),
         Slot::Texture | Slot::FilteredTexture => "texture_2d<f32>".into(),
         Slot::UintTexture => "texture_2d<u32>".into(),
+        Slot::TextureArray => "texture_2d_array<f32>".into(),
         Slot::UintArray => "texture_2d_array<u32>".into(),
         Slot::StorageTexture(format) => format!("texture_storage_2d<{format:?}, write>"),
         Slot::Sampler => "sampler".into(),
@@ -410,6 +421,13 @@ fn kind_of_variable(space: AddressSpace, ty: &TypeInner) -> String {
                     multi: false,
                 },
             ) => "texture_2d<u32>".into(),
+            (
+                true,
+                ImageClass::Sampled {
+                    kind: ScalarKind::Float,
+                    multi: false,
+                },
+            ) => "texture_2d_array<f32>".into(),
             (
                 true,
                 ImageClass::Sampled {
@@ -470,7 +488,7 @@ fn every_layout_stays_within_default_limits() {
             |slot| {
                 matches!(
                     slot,
-                    Slot::Texture | Slot::FilteredTexture | Slot::UintTexture | Slot::UintArray
+                    Slot::Texture | Slot::FilteredTexture | Slot::UintTexture | Slot::TextureArray | Slot::UintArray
                 )
             },
         );
@@ -578,6 +596,24 @@ fn tiles_are_the_same_on_both_sides() {
     let shader = Shader::new("PhotonSplatter tiled", wgsl::PHOTON_SPLATTER_TILED);
     assert_eq!(shader.constant("TILE"), Literal::U32(TILE));
     assert_eq!(shader.constant("TILES_A_SIDE"), Literal::I32(TILES_A_SIDE as i32));
+}
+
+#[test]
+fn tiles_of_nearest_occluders_are_the_same_on_both_sides() {
+    use crate::resource::nearest_occluders;
+    for (name, source) in [
+        ("NearestOccluder", wgsl::NEAREST_OCCLUDER),
+        ("SoftShadow search", wgsl::SOFT_SHADOW_SEARCH),
+    ] {
+        let tiles = Shader::new(name, source).constant("TILES");
+        assert_eq!(tiles, Literal::U32(nearest_occluders::TILES), "{name}");
+    }
+}
+
+#[test]
+fn occluders_begin_at_the_near_plane() {
+    let shader = Shader::new("DirectLight", wgsl::DIRECT_LIGHT);
+    assert_eq!(shader.constant("SHADOW_NEAREST"), Literal::F32(view::NEAR));
 }
 
 #[test]

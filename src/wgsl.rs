@@ -87,6 +87,55 @@ pub(crate) const UPSAMPLER: &str = compose![
 
 pub(crate) const DIRECT_LIGHT: &str = compose![
     "pass/direct_light.wgsl",
+    "common/shadow.wgsl",
+    "common/light.wgsl",
+    "common/g_buffer.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+];
+
+pub(crate) const NEAREST_OCCLUDER: &str = compose![
+    "pass/nearest_occluder.wgsl",
+    "common/light.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+];
+
+pub(crate) const SOFT_SHADOW_TEST: &str = compose![
+    "pass/soft_shadow/test_light.wgsl",
+    "pass/soft_shadow/receiver.wgsl",
+    "common/shadow.wgsl",
+    "common/light.wgsl",
+    "common/g_buffer.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+];
+
+pub(crate) const SOFT_SHADOW_SEARCH: &str = compose![
+    "pass/soft_shadow/search_occluders.wgsl",
+    "pass/soft_shadow/receiver.wgsl",
+    "common/shadow.wgsl",
+    "common/light.wgsl",
+    "common/g_buffer.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+    "common/hash.wgsl",
+];
+
+pub(crate) const SOFT_SHADOW_BLUR: &str = compose![
+    "pass/soft_shadow/blur_axis.wgsl",
+    "pass/soft_shadow/receiver.wgsl",
     "common/light.wgsl",
     "common/g_buffer.wgsl",
     "common/surface_texel.wgsl",
@@ -128,7 +177,7 @@ pub(crate) const TRACE_STATISTICS: &str = compose![
 
 /// Every composed module, by the name of its pass; for validation and for tools.
 #[doc(hidden)]
-pub const MODULES: [(&str, &str); 12] = [
+pub const MODULES: [(&str, &str); 17] = [
     ("MeshGeometry", MESH_GEOMETRY),
     ("PhotonEmitter", PHOTON_EMITTER),
     ("ImageSpaceTracer", IMAGE_SPACE_TRACER),
@@ -136,6 +185,10 @@ pub const MODULES: [(&str, &str); 12] = [
     ("PhotonSplatter quads", PHOTON_SPLATTER_QUADS),
     ("Upsampler", UPSAMPLER),
     ("DirectLight", DIRECT_LIGHT),
+    ("NearestOccluder", NEAREST_OCCLUDER),
+    ("SoftShadow test", SOFT_SHADOW_TEST),
+    ("SoftShadow search", SOFT_SHADOW_SEARCH),
+    ("SoftShadow blur", SOFT_SHADOW_BLUR),
     ("Composite", COMPOSITE),
     ("Accumulator", ACCUMULATOR),
     ("ToneMap", TONE_MAP),

@@ -238,6 +238,7 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
         g_buffer: &g_buffer,
         lights: &lights,
         shadow_maps: &shadow_maps,
+        visibility: None,
         irradiance: &direct,
         timestamps,
     };

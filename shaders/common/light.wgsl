@@ -27,6 +27,8 @@ struct Light {
     // 1 / solid angle of full intensity (point, spot), or 1 / area of the disc (directional)
     density: f32,
     disc_radius: f32,
+    // Radius of the lamp (point, spot), or tangent of the half angle that it subtends (directional); 0: hard shadows
+    extent: f32,
 }
 
 // A ray of light: where it starts, its unit direction, and the layer and place where the shadow map holds it.

@@ -1,4 +1,4 @@
-// Direct irradiance with hard shadows: sum over lights of I cos / r^2, where the shadow map agrees.
+// Direct irradiance: sum over lights of I cos / r^2, where the shadow map agrees, or times how much of the light is seen.
 
 struct Params {
     light_count: u32,
@@ -13,36 +13,16 @@ struct Params {
 @group(0) @binding(5) var<storage, read> lights: array<Light>;
 @group(0) @binding(6) var shadow_maps: texture_2d_array<u32>;
 @group(0) @binding(7) var irradiance: texture_storage_2d<rgba32float, write>;
-
-// A receiver may lie behind its texel's plane by this share of a texel's width before it counts as shadowed: the map's
-// 16-bit normals and curved surfaces within a texel.
-const BIAS_TEXELS: f32 = 0.75;
-// And by this much in any case, unit frame: depth and distance are 24-bit numbers near 1.
-const BIAS: f32 = 0x1p-14;
+@group(1) @binding(0) var visibility: texture_2d_array<f32>;
 
 // Whether light reaches the point p of a surface with normal n, which faces the light.
 fn is_lit(light: Light, p: vec3f, n: vec3f) -> bool {
-    let ray = light_ray_to(light, p);
-    if any(ray.uv < vec2f(0.0)) || any(ray.uv > vec2f(1.0)) {
+    let probe = shadow_probe(light, p, params.shadow_map_size);
+    if !probe.is_inside {
         return true;
     }
-    let size = params.shadow_map_size;
-    let at = cube_face_texel(ray.uv, size);
-    let texel = surface_texel_unpack(textureLoad(shadow_maps, at, ray.layer, 0));
-    if texel.distance <= 0.0 {
-        return true;
-    }
-    let distance = dot(p - ray.origin, ray.direction);
-    let texel_ray = light_texel_ray(light, ray, at, size);
-    let spread = select(distance, 1.0, light.kind == LIGHT_DIRECTIONAL);
-    let texel_width = 2.0 * light.half_extent / f32(size) * spread;
-    if distance <= light_texel_distance(ray, texel_ray, texel) + BIAS + BIAS_TEXELS * texel_width {
-        return true;
-    }
-    // All of the way to the light lies before the receiver's own plane, so nothing behind that plane is in the way: just
-    // past a convex edge the texel's middle may see the edge's other side.
-    let seen = texel_ray.origin + texel.distance * texel_ray.direction;
-    return dot(seen - p, n) <= 0.0;
+    let texel = surface_texel_unpack(textureLoad(shadow_maps, probe.texel, probe.ray.layer, 0));
+    return shadow_is_lit(light, probe, texel, p, n, params.shadow_map_size);
 }
 
 // Irradiance that an unoccluded light gives a surface element.
@@ -60,23 +40,56 @@ fn unoccluded(light: Light, p: vec3f, n: vec3f) -> vec3f {
     return light.intensity * (falloff * max(0.0, dot(n, l)) / distance_squared);
 }
 
+struct Surface {
+    is_seen: bool,
+    position: vec3f,
+    normal: vec3f,
+}
+
+fn surface_at(id: vec2u) -> Surface {
+    let pixel = id + view.origin;
+    let is_seen = textureLoad(base_color_texture, pixel, 0).a > 0.0;
+    let p = g_buffer_position(view, vec2f(id), textureLoad(depth_texture, pixel, 0).r);
+    return Surface(is_seen, p, g_buffer_normal(view, textureLoad(normal_texture, pixel, 0)));
+}
+
+// Tests the shadow maps itself.
 @compute @workgroup_size(8, 8)
 fn light_pixels(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= view.size) {
         return;
     }
-    let pixel = id.xy + view.origin;
-    if textureLoad(base_color_texture, pixel, 0).a <= 0.0 {
+    let surface = surface_at(id.xy);
+    if !surface.is_seen {
         textureStore(irradiance, id.xy, vec4f(0.0));
         return;
     }
-    let p = g_buffer_position(view, vec2f(id.xy), textureLoad(depth_texture, pixel, 0).r);
-    let n = g_buffer_normal(view, textureLoad(normal_texture, pixel, 0));
     var sum = vec3f(0.0);
     for (var i = 0u; i < params.light_count; i++) {
-        let e = unoccluded(lights[i], p, n);
-        if any(e > vec3f(0.0)) && is_lit(lights[i], p, n) {
+        let e = unoccluded(lights[i], surface.position, surface.normal);
+        if any(e > vec3f(0.0)) && is_lit(lights[i], surface.position, surface.normal) {
             sum += e;
+        }
+    }
+    textureStore(irradiance, id.xy, vec4f(sum, 1.0));
+}
+
+// Takes what was found beforehand, one layer a light.
+@compute @workgroup_size(8, 8)
+fn light_pixels_by_visibility(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= view.size) {
+        return;
+    }
+    let surface = surface_at(id.xy);
+    if !surface.is_seen {
+        textureStore(irradiance, id.xy, vec4f(0.0));
+        return;
+    }
+    var sum = vec3f(0.0);
+    for (var i = 0u; i < params.light_count; i++) {
+        let e = unoccluded(lights[i], surface.position, surface.normal);
+        if any(e > vec3f(0.0)) {
+            sum += e * textureLoad(visibility, id.xy, i, 0).r;
         }
     }
     textureStore(irradiance, id.xy, vec4f(sum, 1.0));

@@ -9,14 +9,15 @@ use super::{Plan, Settings, Stage};
 use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, DirectLight, DirectLightInputs,
     DirectLightResources, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapSelector, GBufferCapture,
-    GBufferCaptureInputs, ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitter,
-    PhotonEmitterInputs, PhotonEmitterResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources,
-    ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources, Upsampler, UpsamplerInputs,
+    GBufferCaptureInputs, ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, NearestOccluder,
+    NearestOccluderInputs, NearestOccluderResources, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources,
+    PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, ShadowMapCapture, ShadowMapCaptureInputs,
+    ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources, Upsampler, UpsamplerInputs,
     UpsamplerResources,
 };
 use crate::resource::{
-    CameraView, CapturePurpose, CaptureView, EnvMaps, GBuffer, Geometry, Irradiance, Lights, Photons, PrepareContext,
-    Radiance, ShadowMaps, Subsampling,
+    CameraView, CapturePurpose, CaptureView, EnvMaps, GBuffer, Geometry, Irradiance, Lights, NearestOccluders, Photons,
+    PrepareContext, Radiance, ShadowMaps, Subsampling, Visibility,
 };
 use crate::scene::{Light, SceneBounds, SceneSummary, UnitFrame};
 use crate::{Error, Timestamps};
@@ -48,6 +49,8 @@ pub struct GiRenderer {
 struct Passes {
     g_buffer_capture: GBufferCapture,
     shadow_map_capture: ShadowMapCapture,
+    nearest_occluder: NearestOccluder,
+    soft_shadow: SoftShadow,
     direct_light: DirectLight,
     env_map_selector: EnvMapSelector,
     env_map_capture: EnvMapCapture,
@@ -76,6 +79,8 @@ struct DirectScene {
     shadow_maps: ShadowMaps,
     shadow_layers: u32,
     capture: ShadowMapCaptureResources,
+    /// While a light has an extent.
+    soft: Option<(NearestOccluders, NearestOccluderResources)>,
 }
 
 /// Allocated while there is indirect light.
@@ -95,6 +100,7 @@ pub struct ViewResources {
     radiance: Radiance,
     composite: CompositeResources,
     direct: Option<(Irradiance, DirectLightResources)>,
+    soft: Option<(Visibility, SoftShadowResources)>,
     indirect: Option<IndirectView>,
     size: [u32; 2],
     /// Of the renderer that `direct` and `indirect` were made for.
@@ -161,6 +167,8 @@ impl GiRenderer {
         let passes = Passes {
             g_buffer_capture: GBufferCapture::new(),
             shadow_map_capture: ShadowMapCapture::new(),
+            nearest_occluder: NearestOccluder::new(device),
+            soft_shadow: SoftShadow::new(device),
             direct_light: DirectLight::new(device),
             env_map_selector: EnvMapSelector::new(device),
             env_map_capture: EnvMapCapture::new(),
@@ -245,7 +253,16 @@ impl GiRenderer {
                 shadow_maps: ShadowMaps::new(device, lights, settings.shadow_map_size)?,
                 shadow_layers: ShadowMaps::layers(lights),
                 capture: ShadowMapCaptureResources::new(device, settings.shadow_map_size)?,
+                soft: None,
             });
+        }
+        if let Some(direct) = &mut self.direct {
+            if !plan.is_on(Stage::SoftShadow) {
+                direct.soft = None;
+            } else if direct.soft.is_none() {
+                let nearest = NearestOccluders::new(device, direct.shadow_layers)?;
+                direct.soft = Some((nearest, NearestOccluderResources::new(device)?));
+            }
         }
         if !plan.is_on(Stage::ImageSpaceTracer) {
             self.indirect = None;
@@ -378,6 +395,16 @@ impl GiRenderer {
         self.passes
             .shadow_map_capture
             .record(encoder, &mut direct.capture, &shadow_inputs);
+        if let Some((nearest, own)) = &mut direct.soft {
+            let nearest_inputs = NearestOccluderInputs {
+                queue: inputs.queue,
+                lights: &direct.lights,
+                shadow_maps: &direct.shadow_maps,
+                nearest,
+                timestamps: inputs.timestamps,
+            };
+            self.passes.nearest_occluder.record(encoder, own, &nearest_inputs);
+        }
         self.record_selection(encoder, inputs);
         let (Some(direct), Some(indirect)) = (&self.direct, &mut self.indirect) else {
             return;
@@ -444,6 +471,7 @@ impl GiRenderer {
             radiance: Radiance::new(&self.device, size)?,
             composite: CompositeResources::new(&self.device)?,
             direct: None,
+            soft: None,
             indirect: None,
             size,
             generation: self.generation,
@@ -470,12 +498,28 @@ impl GiRenderer {
         self.passes
             .g_buffer_capture
             .record(encoder, &mut resources.g_buffer, &g_buffer_inputs);
+        if let (Some(scene), Some((visibility, own))) = (&self.direct, &mut resources.soft)
+            && let Some((nearest, _)) = &scene.soft
+        {
+            let soft_inputs = SoftShadowInputs {
+                queue: inputs.queue,
+                g_buffer: &resources.g_buffer,
+                lights: &scene.lights,
+                shadow_maps: &scene.shadow_maps,
+                nearest,
+                visibility,
+                settings: &self.settings.soft_shadow,
+                timestamps: inputs.timestamps,
+            };
+            self.passes.soft_shadow.record(encoder, own, &soft_inputs);
+        }
         if let (Some(scene), Some((irradiance, own))) = (&self.direct, &mut resources.direct) {
             let direct_inputs = DirectLightInputs {
                 queue: inputs.queue,
                 g_buffer: &resources.g_buffer,
                 lights: &scene.lights,
                 shadow_maps: &scene.shadow_maps,
+                visibility: resources.soft.as_ref().map(|s| &s.0),
                 irradiance,
                 timestamps: inputs.timestamps,
             };
@@ -528,7 +572,7 @@ impl GiRenderer {
         let (device, size) = (&self.device, view.size);
         if view.generation != self.generation {
             // Another renderer's, or from before a resource was replaced: neither fits, and both would keep it alive.
-            (view.direct, view.indirect) = (None, None);
+            (view.direct, view.soft, view.indirect) = (None, None, None);
             view.generation = self.generation;
         }
         match &self.direct {
@@ -538,6 +582,19 @@ impl GiRenderer {
                 view.direct = Some((irradiance, DirectLightResources::new(device)?));
             }
             Some(_) => {}
+        }
+        match &self.direct {
+            Some(DirectScene {
+                lights, soft: Some(_), ..
+            }) => {
+                // As many layers as lights; the same shadow maps may serve other numbers of them.
+                if view.soft.as_ref().is_none_or(|s| s.0.lights() != lights.count()) {
+                    let visibility = Visibility::new(device, size, lights.count())?;
+                    let own = SoftShadowResources::new(device, size, lights.count())?;
+                    view.soft = Some((visibility, own));
+                }
+            }
+            _ => view.soft = None,
         }
         match &self.indirect {
             None => view.indirect = None,
@@ -594,6 +651,9 @@ impl GiRenderer {
                 "shadow_maps",
                 direct.shadow_maps.memory_use() + direct.capture.memory_use(),
             ));
+            if let Some((nearest, own)) = &direct.soft {
+                list.push(("nearest_occluders", nearest.memory_use() + own.memory_use()));
+            }
         }
         if let Some(indirect) = &self.indirect {
             list.push((
@@ -649,6 +709,11 @@ impl ViewResources {
         self.direct.as_ref().map(|d| &d.0)
     }
 
+    /// How much of each light is seen, if one has an extent.
+    pub fn visibility(&self) -> Option<&Visibility> {
+        self.soft.as_ref().map(|s| &s.0)
+    }
+
     /// Indirect irradiance, if there is any.
     pub fn indirect(&self) -> Option<&Irradiance> {
         self.indirect.as_ref().map(|i| &i.irradiance)
@@ -662,6 +727,10 @@ impl ViewResources {
         ];
         if let Some((irradiance, own)) = &self.direct {
             list.push(("direct_irradiance", irradiance.memory_use() + own.memory_use()));
+        }
+        if let Some((visibility, own)) = &self.soft {
+            list.push(("visibility", visibility.memory_use()));
+            list.push(("soft_shadow", own.memory_use()));
         }
         if let Some(own) = &self.indirect {
             list.push(("indirect_irradiance", own.irradiance.memory_use()));

@@ -11,6 +11,8 @@ pub enum Stage {
     GBufferCapture,
     /// What the lights see.
     ShadowMapCapture,
+    /// Penumbrae.
+    SoftShadow,
     /// Direct irradiance.
     DirectLight,
     /// What is around a few points.
@@ -25,8 +27,6 @@ pub enum Stage {
     Upsampler,
     /// Photons by way of mirrors and glass.
     CausticPhotons,
-    /// Penumbrae.
-    SoftShadow,
     /// The sum.
     Composite,
 }
@@ -76,8 +76,9 @@ impl Plan {
         };
         let soft = match summary.lights_with_extent {
             0 => "no light has an extent".to_owned(),
-            n => format!("{n} light(s) with an extent: not modelled yet"),
+            n => format!("{n} light(s) with an extent"),
         };
+        let soft = (light_exists && summary.lights_with_extent > 0, soft);
         let stage = |stage, (on, reason): (bool, String)| PlannedStage { stage, on, reason };
         let always = |reason: &str| (true, reason.to_owned());
         let maps = (indirect.0, map_reason(&indirect, settings));
@@ -86,6 +87,7 @@ impl Plan {
             stages: vec![
                 stage(Stage::GBufferCapture, always("every view")),
                 stage(Stage::ShadowMapCapture, lit.clone()),
+                stage(Stage::SoftShadow, soft),
                 stage(Stage::DirectLight, lit),
                 stage(Stage::EnvMapCapture, maps),
                 stage(Stage::PhotonEmitter, indirect.clone()),
@@ -93,7 +95,6 @@ impl Plan {
                 stage(Stage::PhotonSplatter, indirect),
                 stage(Stage::Upsampler, upsampling),
                 stage(Stage::CausticPhotons, (false, caustics)),
-                stage(Stage::SoftShadow, (false, soft)),
                 stage(Stage::Composite, always("every view")),
             ],
             simplifications: simplifications(summary),
@@ -156,7 +157,7 @@ fn simplifications(summary: &SceneSummary) -> Vec<String> {
     }
     if summary.lights_with_extent > 0 {
         notes.push(format!(
-            "{} light(s) with an extent, treated as points: hard shadows",
+            "{} light(s) with an extent: photons start at the centre, irradiance is a point's",
             summary.lights_with_extent
         ));
     }
@@ -251,7 +252,7 @@ mod tests {
             ..summary()
         };
         let text = Plan::for_scene(&summary, &Settings::balanced()).to_string();
-        for name in ["ceiling lamp", "chrome", "window", "hard shadows"] {
+        for name in ["ceiling lamp", "chrome", "window", "irradiance is a point's"] {
             assert!(text.contains(name), "{name} in\n{text}");
         }
     }

@@ -3,7 +3,8 @@
 use crate::Error;
 use crate::pass::{
     Bandwidth, EnvMapSelectorResources, EnvMapSelectorSettings, ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS,
-    MAX_SELECTED, PhotonSplatterConfig, PhotonSplatterSettings, SplatShape, TraceMethod, UpsamplerSettings,
+    MAX_SELECTED, MAX_TAPS, PenumbraSearch, PhotonSplatterConfig, PhotonSplatterSettings, SoftShadowSettings,
+    SplatShape, TraceMethod, UpsamplerSettings,
 };
 use crate::resource::Subsampling;
 
@@ -31,6 +32,8 @@ pub struct Settings {
     pub env_map_size: u32,
     /// Texels along a layer of a shadow map. Finer sharpens shadow edges, direct and in first hits; costs as the square.
     pub shadow_map_size: u32,
+    /// How penumbrae of lights with an extent are gathered.
+    pub soft_shadow: SoftShadowSettings,
     /// Where environment maps are taken from.
     pub selector: EnvMapSelectorSettings,
     /// How rays are traced: the default method has a quarter of the paper's error at twice its time.
@@ -82,6 +85,7 @@ impl Settings {
             env_map_count: 8,
             env_map_size: 128,
             shadow_map_size: 512,
+            soft_shadow: SoftShadowSettings::default(),
             selector: EnvMapSelectorSettings::default(),
             tracer: ImageSpaceTracerSettings::default(),
             splatter_config: PhotonSplatterConfig::default(),
@@ -99,6 +103,7 @@ impl Settings {
             env_map_count: 12,
             env_map_size: 256,
             shadow_map_size: 1024,
+            soft_shadow: SoftShadowSettings::accurate(),
             splatter: PhotonSplatterSettings {
                 bandwidth: Bandwidth::Density {
                     photons: 20.0,
@@ -238,6 +243,31 @@ const KNOBS: &[Knob] = &[
     field!("env_maps.size", "4 to 8192", env_map_size, |v| (4..=8192).contains(&v)),
     field!("shadow_maps.size", "4 to 8192", shadow_map_size, |v| (4..=8192)
         .contains(&v)),
+    choice!(
+        "soft_shadow.search",
+        "on or off",
+        soft_shadow.search,
+        ["on", PenumbraSearch::On],
+        ["off", PenumbraSearch::Off]
+    ),
+    field!("soft_shadow.search_taps", "1 to 64", soft_shadow.search_taps, |v| (1
+        ..=MAX_TAPS)
+        .contains(&v)),
+    field!("soft_shadow.blur_taps", "1 to 64", soft_shadow.blur_taps, |v| (1
+        ..=MAX_TAPS)
+        .contains(&v)),
+    field!(
+        "soft_shadow.max_radius",
+        "above 0: pixels",
+        soft_shadow.max_radius,
+        |v: f32| v > 0.0 && v.is_finite()
+    ),
+    field!(
+        "soft_shadow.range_scale",
+        "above 0: share of the penumbra's radius",
+        soft_shadow.range_scale,
+        |v: f32| v > 0.0 && v.is_finite()
+    ),
     field!("selector.candidates", "1 to 512", selector.candidates, |v| (1
         ..=MAX_CANDIDATES)
         .contains(&v)),

@@ -13,9 +13,11 @@ pub(crate) mod env_map_selector;
 mod full_screen;
 mod g_buffer_capture;
 pub(crate) mod image_space_tracer;
+pub(crate) mod nearest_occluder;
 pub(crate) mod photon_emitter;
 pub(crate) mod photon_splatter;
 mod shadow_map_capture;
+pub(crate) mod soft_shadow;
 pub(crate) mod tone_map;
 pub(crate) mod trace_statistics;
 pub(crate) mod upsampler;
@@ -32,6 +34,7 @@ pub use g_buffer_capture::{GBufferCapture, GBufferCaptureInputs};
 pub use image_space_tracer::{
     ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, ImageSpaceTracerSettings, TraceMethod,
 };
+pub use nearest_occluder::{NearestOccluder, NearestOccluderInputs, NearestOccluderResources};
 pub use photon_emitter::{PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources};
 pub(crate) use photon_splatter::LARGEST_RADIUS;
 pub use photon_splatter::{
@@ -39,6 +42,8 @@ pub use photon_splatter::{
     PhotonSplatterSettings, SplatShape,
 };
 pub use shadow_map_capture::{ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources};
+pub(crate) use soft_shadow::MAX_TAPS;
+pub use soft_shadow::{PenumbraSearch, SoftShadow, SoftShadowInputs, SoftShadowResources, SoftShadowSettings};
 pub use tone_map::{ToneCurve, ToneMap, ToneMapInputs, ToneMapResources, ToneMapSettings};
 pub use trace_statistics::{HopStatistics, TraceStatistics, TraceStatisticsInputs, TraceStatisticsResources};
 pub use upsampler::{Upsampler, UpsamplerInputs, UpsamplerResources, UpsamplerSettings};

@@ -41,6 +41,8 @@ pub(crate) mod gpu {
         pub(crate) photon_count: u32,
         pub(crate) density: f32,
         pub(crate) disc_radius: f32,
+        pub(crate) extent: f32,
+        pub(crate) _pad: [f32; 3],
     }
 }
 
@@ -112,6 +114,11 @@ impl Lights {
         self.written.len() as u32
     }
 
+    /// Whether each light written has an extent, and so a penumbra.
+    pub(crate) fn have_extent(&self) -> impl Iterator<Item = bool> {
+        self.written.iter().map(|l| l.extent > 0.0)
+    }
+
     /// Photons that the lights written emit in all.
     pub fn photon_count(&self) -> u32 {
         self.written.iter().map(|l| l.photon_count).sum()
@@ -159,21 +166,28 @@ fn record(frame: &UnitFrame, light: &Light, first_layer: u32, first_photon: u32,
     let (mut inner, mut outer, mut kind) = (2.0, 2.0, gpu::POINT);
     let (mut position, mut intensity) = (Vec3::ZERO, frame.intensity(light.strength()));
     let mut density = 1.0 / light.effective_solid_angle().max(f64::MIN_POSITIVE);
+    let extent;
     match light.kind {
-        LightKind::Point { position: p, .. } => position = frame.point(p),
+        LightKind::Point { position: p, radius } => {
+            position = frame.point(p);
+            extent = radius / frame.length_scale();
+        }
         LightKind::Spot {
             position: p,
             inner_angle,
             outer_angle,
+            radius,
             ..
         } => {
             kind = gpu::SPOT;
             position = frame.point(p);
+            extent = radius / frame.length_scale();
             inner = crate::scene::one_minus_cos(inner_angle);
             outer = crate::scene::one_minus_cos(outer_angle);
         }
-        LightKind::Directional { .. } => {
+        LightKind::Directional { angle, .. } => {
             kind = gpu::DIRECTIONAL;
+            extent = angle.tan();
             intensity = frame.radiance(light.strength());
             let radius = f64::from(frame.radius());
             density = 1.0 / (std::f64::consts::PI * radius * radius);
@@ -196,6 +210,8 @@ fn record(frame: &UnitFrame, light: &Light, first_layer: u32, first_photon: u32,
         photon_count: count,
         density: density as f32,
         disc_radius: frame.radius(),
+        extent: extent as f32,
+        _pad: [0.0; 3],
     }
 }
 

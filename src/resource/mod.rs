@@ -10,10 +10,12 @@ mod geometry;
 mod irradiance;
 pub(crate) mod lights;
 pub(crate) mod mesh_geometry;
+pub(crate) mod nearest_occluders;
 mod photons;
 mod radiance;
 mod shadow_maps;
 pub(crate) mod view;
+mod visibility;
 
 pub use env_maps::EnvMaps;
 pub(crate) use env_maps::SURFACE_FORMAT;
@@ -22,10 +24,12 @@ pub use geometry::{CaptureTargets, Geometry, PrepareContext};
 pub use irradiance::{Irradiance, Subsampling};
 pub use lights::{Lights, MAX_LIGHTS};
 pub use mesh_geometry::MeshGeometry;
+pub use nearest_occluders::NearestOccluders;
 pub use photons::{PHOTON_BYTES, Photon, PhotonState, Photons};
 pub use radiance::Radiance;
 pub use shadow_maps::ShadowMaps;
 pub use view::{CameraView, CaptureMask, CapturePurpose, CaptureView};
+pub use visibility::Visibility;
 
 use crate::Error;
 

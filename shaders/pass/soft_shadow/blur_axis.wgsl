@@ -1,0 +1,57 @@
+// Visibility blurred along one axis of the penumbra's ellipse on the receiver; the other axis follows.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> view: View;
+@group(0) @binding(2) var depth_texture: texture_2d<f32>;
+@group(0) @binding(3) var normal_texture: texture_2d<f32>;
+@group(0) @binding(4) var<storage, read> lights: array<Light>;
+@group(0) @binding(5) var radii: texture_2d<f32>;
+@group(0) @binding(6) var source: texture_2d<f32>;
+@group(0) @binding(7) var target_texture: texture_storage_2d<r32float, write>;
+
+// 0: across the tilt, the first to run; 1: along it
+override AXIS: u32;
+
+// Mean of the visibility along an axis, weighted by the width of a disc: an occluder's straight edge across the axis then
+// shows as much of a disc-shaped lamp as is seen past it.
+fn blurred(light: Light, id: vec2u, own: f32) -> f32 {
+    let radius_across = textureLoad(radii, id, 0).r;
+    if own == NO_RECEIVER || radius_across <= 0.0 {
+        return own;
+    }
+    let receiver = receiver_at(light, id);
+    let line = line_along(receiver.position, receiver_axes(receiver)[AXIS]);
+    let radius = line_radius(line, radius_across, params.max_radius);
+    let step = 2.0 / f32(2u * params.blur_taps + 1u);
+    // Taps a pixel or more apart would show as so many copies of an edge: each pixel takes another place in each step.
+    let dither = clamp(2.0 * radius * line_pixels(line) * step - 1.0, 0.0, 1.0);
+    let phase = dither * (pixel_phase(select(id, id.yx, AXIS == 1u)) - 0.5);
+    var sum = vec2f(0.0);
+    for (var i = 0u; i <= 2u * params.blur_taps; i++) {
+        let x = (f32(i) + 0.5 + phase) * step - 1.0;
+        let pixel = line_pixel(line, x * radius);
+        if pixel.x < 0 {
+            continue;
+        }
+        let seen = textureLoad(source, pixel, 0).r;
+        if seen == NO_RECEIVER {
+            continue;
+        }
+        let weight = sqrt(max(1.0 - x * x, 0.0)) * receiver_range_weight(receiver, vec2u(pixel), radius_across);
+        sum += vec2f(seen, 1.0) * weight;
+    }
+    return select(own, sum.x / sum.y, sum.y > 0.0);
+}
+
+@compute @workgroup_size(8, 8)
+fn blur_pixels(@builtin(global_invocation_id) id: vec3u) {
+    if any(id.xy >= view.size) {
+        return;
+    }
+    var visibility = blurred(lights[params.light], id.xy, textureLoad(source, id.xy, 0).r);
+    if AXIS == 1u {
+        // Marks end here, and so does what rounding left outside.
+        visibility = clamp(visibility, 0.0, 1.0);
+    }
+    textureStore(target_texture, id.xy, vec4f(visibility));
+}
