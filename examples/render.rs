@@ -63,7 +63,8 @@ enum Method {
     --method surface-lights|illumination-maps, --budget-ms, glTF skins."
 )]
 struct Arguments {
-    /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, plane, furnace, two-rooms, pillars)
+    /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, plane, furnace, two-rooms, pillars,
+    /// penumbra)
     scene: String,
     /// Width in pixels
     #[arg(long, default_value_t = 512)]

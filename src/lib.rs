@@ -1,4 +1,4 @@
-//! Global-illumination passes for wgpu: direct light with hard shadows and diffuse indirect light, for any host that
+//! Global-illumination passes for wgpu: direct light with soft shadows and diffuse indirect light, for any host that
 //! can draw its geometry.
 //!
 //! Photons start at the lights and land where the lights' shadow maps see a surface. From there they bounce through
@@ -104,7 +104,7 @@
 //!
 //! # What is not modelled
 //!
-//! Every surface is Lambertian; emissive surfaces shine for the eye and light nothing; shadows are hard.
+//! Every surface is Lambertian; emissive surfaces shine for the eye and light nothing.
 //! [`Plan::simplifications`](frame::Plan::simplifications) names what this means for a given scene.
 
 #![cfg_attr(docsrs, feature(doc_cfg))]

@@ -6,6 +6,7 @@ use lightfall::glam::{DAffine3, DVec3, Vec3};
 use lightfall::pass::{PhotonSplatter, PhotonSplatterConfig, SplatShape};
 use lightfall::resource::{
     EnvMaps, GBuffer, GBufferViews, Irradiance, Lights, MAX_LIGHTS, MeshGeometry, NormalEncoding, Photons, Radiance,
+    Visibility,
 };
 use lightfall::scene::{Light, LightKind, Scene, SceneBounds, SceneSummary, UnitFrame, samples};
 use lightfall::{Error, Timestamps, wgpu};
@@ -257,6 +258,18 @@ fn views_of_a_host_that_do_not_fit_are_refused_by_name() {
             ),
             "{error}"
         );
+        assert!(matches!(
+            Visibility::from_view(&rgba8),
+            Err(Error::IncompatibleView { property: "format", .. })
+        ));
+        let no_spare = texture(device, F::R32Float, [8, 8], 1);
+        assert!(matches!(
+            Visibility::from_view(&no_spare),
+            Err(Error::IncompatibleView {
+                property: "layer count",
+                ..
+            })
+        ));
         assert!(matches!(
             Irradiance::from_view(&rgba8),
             Err(Error::IncompatibleView { .. })

@@ -270,6 +270,38 @@ fn an_empty_scene_is_no_error() {
 // ---- Lights and cameras -------------------------------------------------------------------------------------------
 
 #[test]
+fn extras_give_lights_an_extent() {
+    let mut asset = Asset::new();
+    let with = |lights: Value| json!({"KHR_lights_punctual": {"lights": lights}});
+    asset.json["extensions"] = with(json!([
+        {"type": "point", "extras": {"radius": 0.25, "angle": 9}},
+        {"type": "spot", "extras": {"radius": 0.5, "note": "a shade"}},
+        {"type": "directional", "extras": {"angle": 0.125}},
+        {"type": "point", "extras": [1, 2]},
+    ]));
+    let node = |light: usize| json!({"extensions": {"KHR_lights_punctual": {"light": light}}});
+    asset.json["nodes"] = json!([node(0), node(1), node(2), node(3)]);
+    asset.json["scenes"] = json!([{"nodes": [0, 1, 2, 3]}]);
+    let extents: Vec<f64> = asset
+        .load()
+        .lights
+        .iter()
+        .map(|light| match light.kind {
+            LightKind::Point { radius, .. } | LightKind::Spot { radius, .. } => radius,
+            LightKind::Directional { angle, .. } => angle,
+        })
+        .collect();
+    assert_eq!(extents, [0.25, 0.5, 0.125, 0.0]);
+    for bad in [json!("wide"), json!(-1)] {
+        asset.json["extensions"] = with(json!([{"type": "point", "extras": {"radius": bad}}]));
+        asset.json["nodes"] = json!([node(0)]);
+        asset.json["scenes"] = json!([{"nodes": [0]}]);
+        let error = asset.error();
+        assert!(error.contains("radius"), "{error}");
+    }
+}
+
+#[test]
 fn lights_shine_along_minus_z_of_their_node_and_ignore_its_scale() {
     let mut asset = Asset::new();
     asset.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [

@@ -890,13 +890,21 @@ fn triangle_list(mode: Mode, corners: Vec<u32>) -> Vec<u32> {
     }
 }
 
-/// A light at its node, shining along the node's −Z. The node's scale bends that axis at most; `range` is ignored.
+/// A light at its node, shining along the node's −Z. The node's scale bends that axis at most; `range` is ignored. The
+/// extension has no extent: a number "radius" (metres; point, spot) or "angle" (half, radians; directional) among the
+/// light's `extras` gives it one.
 fn convert_light(light: &PunctualLight, node: &json::Node, transform: DAffine3) -> Result<Light, String> {
     let position = transform.translation;
     let direction = (transform.matrix3 * DVec3::NEG_Z).normalize_or_zero();
     let kind = match checked(&light.type_, "light type")? {
-        PunctualType::Point => LightKind::Point { position, radius: 0.0 },
-        PunctualType::Directional => LightKind::Directional { direction, angle: 0.0 },
+        PunctualType::Point => LightKind::Point {
+            position,
+            radius: extra(light, "radius")?,
+        },
+        PunctualType::Directional => LightKind::Directional {
+            direction,
+            angle: extra(light, "angle")?,
+        },
         PunctualType::Spot => {
             // The extension's default cone.
             let cone = light
@@ -909,7 +917,7 @@ fn convert_light(light: &PunctualLight, node: &json::Node, transform: DAffine3) 
                 direction,
                 inner_angle,
                 outer_angle,
-                radius: 0.0,
+                radius: extra(light, "radius")?,
             }
         }
     };
@@ -919,6 +927,20 @@ fn convert_light(light: &PunctualLight, node: &json::Node, transform: DAffine3) 
         color: light.color,
         intensity: light.intensity,
     })
+}
+
+/// A number among the light's `extras`; 0 if there is none of this name. Its range is the scene's to check.
+fn extra(light: &PunctualLight, name: &str) -> Result<f64, String> {
+    let Some(raw) = &light.extras else {
+        return Ok(0.0);
+    };
+    let extras: Value = json::deserialize::from_str(raw.get()).map_err(|error| format!("light extras: {error}"))?;
+    match extras.get(name) {
+        None => Ok(0.0),
+        Some(value) => value
+            .as_f64()
+            .ok_or_else(|| format!("light extras: {name:?} is {value}, not a number")),
+    }
 }
 
 /// An angle in 64 bits. π/2, the widest cone, rounds up in 32 bits, which must not make it too wide.

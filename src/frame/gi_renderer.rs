@@ -10,10 +10,10 @@ use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, DirectLight, DirectLightInputs,
     DirectLightResources, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapSelector, GBufferCapture,
     GBufferCaptureInputs, ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, NearestOccluder,
-    NearestOccluderInputs, NearestOccluderResources, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources,
-    PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, ShadowMapCapture, ShadowMapCaptureInputs,
-    ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources, Upsampler, UpsamplerInputs,
-    UpsamplerResources,
+    NearestOccluderInputs, NearestOccluderResources, PenumbraSearch, PhotonEmitter, PhotonEmitterInputs,
+    PhotonEmitterResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, ShadowMapCapture,
+    ShadowMapCaptureInputs, ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources, Upsampler,
+    UpsamplerInputs, UpsamplerResources,
 };
 use crate::resource::{
     CameraView, CapturePurpose, CaptureView, EnvMaps, GBuffer, Geometry, Irradiance, Lights, NearestOccluders, Photons,
@@ -395,7 +395,9 @@ impl GiRenderer {
         self.passes
             .shadow_map_capture
             .record(encoder, &mut direct.capture, &shadow_inputs);
-        if let Some((nearest, own)) = &mut direct.soft {
+        if let Some((nearest, own)) = &mut direct.soft
+            && self.settings.soft_shadow.search == PenumbraSearch::On
+        {
             let nearest_inputs = NearestOccluderInputs {
                 queue: inputs.queue,
                 lights: &direct.lights,

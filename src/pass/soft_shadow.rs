@@ -89,8 +89,8 @@ pub(crate) const MAX_TAPS: u32 = 64;
 /// Where the width of penumbrae comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum PenumbraSearch {
-    /// No search (the paper's faster variant, its chapter 5): every edge is blurred by one radius, that of an occluder half
-    /// way to the lamp, which is the lamp's own; for parallel light, of an occluder as far away as the region's radius.
+    /// No search (the paper's faster variant, its chapter 5): every edge is blurred by one radius, that of an occluder a
+    /// quarter of the way to the lamp: a third of the lamp's own. For parallel light the way is the region's diameter.
     /// Shadows do not harden towards contact.
     Off,
     /// From the distance of the occluders around each receiver.

@@ -13,6 +13,9 @@ pub const MAX_LIGHTS: usize = 64;
 /// by flux.
 const EVEN_SHARE: f64 = 0.25;
 
+/// Beyond this a lamp's extent is no larger: infinity times a distance of zero is no number.
+const LARGEST_EXTENT: f64 = 1e30;
+
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
@@ -210,7 +213,7 @@ fn record(frame: &UnitFrame, light: &Light, first_layer: u32, first_photon: u32,
         photon_count: count,
         density: density as f32,
         disc_radius: frame.radius(),
-        extent: extent as f32,
+        extent: extent.min(LARGEST_EXTENT) as f32,
         _pad: [0.0; 3],
     }
 }

@@ -5,7 +5,15 @@ use glam::{DAffine3, DVec3, Vec3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Names accepted by [`by_name`], in the order of this list.
-pub const NAMES: [&str; 6] = ["cornell", "cornell-spot", "plane", "furnace", "two-rooms", "pillars"];
+pub const NAMES: [&str; 7] = [
+    "cornell",
+    "cornell-spot",
+    "plane",
+    "furnace",
+    "two-rooms",
+    "pillars",
+    "penumbra",
+];
 
 /// The sample of this name at `time`, or `None` if there is none.
 pub fn by_name(name: &str, time: f64) -> Option<Scene> {
@@ -16,6 +24,7 @@ pub fn by_name(name: &str, time: f64) -> Option<Scene> {
         "furnace" => furnace(0.5, 1.0),
         "two-rooms" => two_rooms(time),
         "pillars" => pillars(time),
+        "penumbra" => penumbra(time),
         _ => return None,
     })
 }
@@ -158,6 +167,45 @@ pub fn pillars(time: f64) -> Scene {
         DVec3::new(1.0, 1.2, -0.6),
         DVec3::Y,
         65f64.to_radians(),
+    );
+    builder.scene
+}
+
+/// Radius of the lamp in [`penumbra`], metres.
+pub const LAMP_RADIUS: f64 = 0.2;
+
+/// A post that stands on a 6 m square floor and a slab that hovers over it, under a spherical lamp of [`LAMP_RADIUS`]: the
+/// post's shadow is sharp at its foot and widens away from it. The slab rises and sinks, once in four seconds.
+pub fn penumbra(time: f64) -> Scene {
+    let mut builder = Builder::default();
+    let grey = builder.material(Material::diffuse("grey", [0.6; 3]));
+    let blue = builder.material(Material::diffuse("blue", [0.25, 0.35, 0.6]));
+    let ochre = builder.material(Material::diffuse("ochre", [0.65, 0.5, 0.2]));
+    let (l, r) = (-3.0, 3.0);
+    builder.quad("floor", [[l, 0.0, r], [r, 0.0, r], [r, 0.0, l], [l, 0.0, l]], grey);
+    let mut post = cuboid([-1.15, 0.0, -0.15], [-0.85, 1.5, 0.15]);
+    post.name = "post".into();
+    builder.mesh(post, blue);
+    let mut slab = cuboid([0.3, 0.0, -0.5], [1.3, 0.1, 0.5]);
+    slab.name = "slab".into();
+    let slab = builder.mesh(slab, ochre);
+    let height = 0.5 + 0.3 * (1.0 - (TAU * time / 4.0).cos());
+    builder.scene.instances[slab].transform = DAffine3::from_translation(DVec3::new(0.0, height, 0.0));
+    builder.scene.lights.push(Light {
+        name: "lamp".into(),
+        kind: LightKind::Point {
+            position: DVec3::new(0.6, 3.0, -1.2),
+            radius: LAMP_RADIUS,
+        },
+        color: [1.0, 0.93, 0.8],
+        intensity: 25.0,
+    });
+    builder.look(
+        "camera",
+        DVec3::new(0.4, 2.4, 4.2),
+        DVec3::new(0.0, 0.3, 0.3),
+        DVec3::Y,
+        50f64.to_radians(),
     );
     builder.scene
 }
@@ -408,7 +456,7 @@ mod tests {
 
     #[test]
     fn something_moves_in_each_sample_that_says_so() {
-        for name in ["cornell", "cornell-spot", "two-rooms", "pillars"] {
+        for name in ["cornell", "cornell-spot", "two-rooms", "pillars", "penumbra"] {
             let (a, b) = (by_name(name, 0.0).unwrap(), by_name(name, 1.0).unwrap());
             assert!(a.instances != b.instances || a.lights != b.lights, "{name}");
         }

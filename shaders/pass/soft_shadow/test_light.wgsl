@@ -44,8 +44,9 @@ fn test_pixels(@builtin(global_invocation_id) id: vec3u) {
     }
     let result = test(light, receiver);
     textureStore(visibility, id.xy, vec4f(select(0.0, 1.0, result.is_lit)));
-    // Half way: from lamp to receiver, and of parallel light through the region.
-    let half_way = select(0.5 * receiver.distance, light.disc_radius, light.kind == LIGHT_DIRECTIONAL);
-    let one_radius = shadow_penumbra_radius(light, receiver.distance, half_way);
+    // Occluders tend to stand nearer to what they shade than to the lamp: a quarter of the way from receiver to lamp, or
+    // through the region.
+    let way = select(receiver.distance, 2.0 * light.disc_radius, light.kind == LIGHT_DIRECTIONAL);
+    let one_radius = shadow_penumbra_radius(light, receiver.distance, 0.25 * way);
     textureStore(occlusion, id.xy, vec4f(select(result.gap, one_radius, params.search == 0u)));
 }
