@@ -216,13 +216,12 @@ impl GiRenderer {
         };
         let plan = Plan::for_scene(summary, &self.settings);
         self.allocate(&plan, lights)?;
-        let length = frame.length_scale();
         self.state = Some(SceneState {
             frame,
             plan,
             lights: lights.to_vec(),
             region: summary.bounds,
-            area: (summary.area / (length * length)) as f32,
+            area: frame.area(summary.area),
         });
         if let Some(direct) = &mut self.direct {
             direct.lights.write(queue, &frame, lights, self.settings.photons)?;

@@ -47,7 +47,8 @@ pub struct GBufferViews {
     pub normal_encoding: NormalEncoding,
     /// Reflectance, linear RGB after any format conversion; alpha above 0 where a surface is seen.
     pub base_color: wgpu::TextureView,
-    /// Emitted radiance towards the viewer, unit frame, RGB. Hosts without emission give any black texture.
+    /// Emitted radiance towards the viewer, unit frame, RGB. Hosts without emission give a black texture of one texel:
+    /// what lies outside it reads as black.
     pub emission: wgpu::TextureView,
     /// The part in use (x, y, width, height), for dynamic resolution; `None`: all of it.
     pub rectangle: Option<[u32; 4]>,
@@ -135,7 +136,7 @@ impl GBuffer {
         let full = extent(&views.depth);
         expect("G-buffer normal", "size", extent(&views.normal), &[full])?;
         expect("G-buffer base colour", "size", extent(&views.base_color), &[full])?;
-        expect("G-buffer emission", "size", extent(&views.emission), &[full])?;
+        expect("G-buffer emission", "size", extent(&views.emission), &[full, [1, 1]])?;
         let [x, y, width, height] = views.rectangle.unwrap_or([0, 0, full[0], full[1]]);
         let fits =
             |start: u32, length: u32, limit: u32| length > 0 && start.checked_add(length).is_some_and(|e| e <= limit);

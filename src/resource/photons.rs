@@ -2,6 +2,7 @@
 
 use crate::{Error, gpu};
 use bytemuck::{Pod, Zeroable};
+use glam::{Vec2, Vec2Swizzles as _, Vec3};
 
 /// Bytes of one photon record.
 pub const PHOTON_BYTES: u64 = size_of::<Photon>() as u64;
@@ -60,6 +61,21 @@ impl Photon {
     /// Whether the path came straight from its light: direct light, which is not splatted.
     pub fn is_first_hit(&self) -> bool {
         self.state & Self::FIRST_HIT != 0
+    }
+
+    /// A unit vector as `normal` and `direction` hold it: the bits that `octahedral_pack` of the shaders makes.
+    pub fn pack_unit_vector(v: Vec3) -> u32 {
+        let p = v.truncate() / (v.x.abs() + v.y.abs() + v.z.abs());
+        let folded = (Vec2::ONE - p.yx().abs()) * Vec2::select(p.cmpge(Vec2::ZERO), Vec2::ONE, Vec2::NEG_ONE);
+        let encoded = if v.z >= 0.0 { p } else { folded };
+        let [x, y] = encoded.to_array().map(snorm16);
+        u32::from(x) | u32::from(y) << 16
+    }
+
+    /// Linear RGB in [0, 1] as `reflectance` holds it, 11-11-10.
+    pub fn pack_reflectance(rgb: [f32; 3]) -> u32 {
+        let steps = |value: f32, most: f32| (value.clamp(0.0, 1.0) * most).round() as u32;
+        steps(rgb[0], 2047.0) | steps(rgb[1], 2047.0) << 11 | steps(rgb[2], 1023.0) << 22
     }
 
     /// Reflectance of the surface hit.
@@ -168,5 +184,53 @@ impl Photons {
     /// Bytes this resource allocated.
     pub fn memory_use(&self) -> u64 {
         self.bytes
+    }
+}
+
+/// As `pack2x16snorm` rounds.
+fn snorm16(value: f32) -> u16 {
+    (0.5 + 32767.0 * value.clamp(-1.0, 1.0)).floor() as i16 as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Twin of `octahedral_unpack`.
+    fn unpack(bits: u32) -> Vec3 {
+        let [x, y] = [bits, bits >> 16].map(|b| f32::from(b as u16 as i16) / 32767.0);
+        let z = 1.0 - x.abs() - y.abs();
+        let fold = |a: f32, b: f32| (1.0 - b.abs()) * if a >= 0.0 { 1.0 } else { -1.0 };
+        let [x, y] = if z >= 0.0 { [x, y] } else { [fold(x, y), fold(y, x)] };
+        Vec3::new(x, y, z).normalize()
+    }
+
+    #[test]
+    fn a_packed_unit_vector_comes_back() {
+        // Half a step of either coordinate moves the point of the octahedron by at most 2.5 / 65534, and the octahedron
+        // comes no nearer to the origin than 1 / √3.
+        let worst = 2.5 / 65534.0 * 3f32.sqrt();
+        for i in 0..1000u32 {
+            let z = 1.0 - 2.0 * i as f32 / 999.0;
+            let (sin, cos) = (2.4 * i as f32).sin_cos();
+            let v = Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z);
+            let error = (unpack(Photon::pack_unit_vector(v)) - v).length();
+            assert!(error < worst, "{v}: {error}");
+        }
+        assert_eq!(Photon::pack_unit_vector(Vec3::Z), 0);
+        assert_eq!(Photon::pack_unit_vector(Vec3::NEG_Z), 0x7fff_7fff);
+    }
+
+    #[test]
+    fn a_packed_reflectance_comes_back() {
+        let rgb = [0.73, 0.05, 0.151];
+        let photon = Photon {
+            reflectance: Photon::pack_reflectance(rgb),
+            ..Zeroable::zeroed()
+        };
+        let [r, g, b] = photon.reflectance();
+        assert!((r - rgb[0]).abs() < 0.51 / 2047.0 && (g - rgb[1]).abs() < 0.51 / 2047.0);
+        assert!((b - rgb[2]).abs() < 0.51 / 1023.0);
+        assert_eq!(Photon::pack_reflectance([1.0, 2.0, -1.0]), 0x003f_ffff);
     }
 }

@@ -135,7 +135,12 @@ impl UnitFrame {
         .into_mat4()
     }
 
-    /// A light's radiant intensity, W/sr, in the unit frame.
+    /// An area, world units squared, in the unit frame.
+    pub fn area(&self, world: f64) -> f32 {
+        (world * exp2(-2 * self.length_exponent)) as f32
+    }
+
+    /// A light's radiant intensity, W/sr, or a flux, W, in the unit frame.
     pub fn intensity(&self, world: DVec3) -> Vec3 {
         (world / self.flux_scale()).as_vec3()
     }
