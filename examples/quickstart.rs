@@ -54,7 +54,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
 
     // The image is in `view.radiance()`, linear, in world units.
-    picture::write_png(&gpu, path.as_ref(), view.radiance(), 1.0)?;
+    picture::write_png((device, queue), path.as_ref(), view.radiance(), 1.0)?;
     println!("{path}: rendered on {} ({})", gpu.info.name, gpu.info.backend);
     Ok(())
 }

@@ -313,7 +313,7 @@ fn write(gpu: &Gpu, offline: &Offline<'_>, path: &Path, exposure: Option<f32>) -
         return exr_file::write_rgb(path, size[0], size[1], &pixels);
     }
     let exposure = exposure.unwrap_or_else(|| picture::exposure_for(&pixels));
-    picture::write_png(gpu, path, offline.radiance(), exposure)
+    picture::write_png((&gpu.device, &gpu.queue), path, offline.radiance(), exposure)
 }
 
 /// A bar on a terminal, nothing in a pipe.

@@ -1,6 +1,5 @@
 //! Display pictures: tone mapping on the GPU, PNG on disk.
 
-use super::adapter::Gpu;
 use super::exr_file::replace_file;
 use lightfall::pass::{ToneMap, ToneMapInputs, ToneMapResources, ToneMapSettings};
 use lightfall::resource::Radiance;
@@ -23,10 +22,15 @@ pub(crate) fn exposure_for(pixels: &[[f32; 3]]) -> f32 {
 }
 
 /// Tone-maps radiance and writes an 8-bit PNG, whole or not at all.
-pub(crate) fn write_png(gpu: &Gpu, path: &Path, radiance: &Radiance, exposure: f32) -> Result<(), String> {
+pub(crate) fn write_png(
+    (device, queue): (&wgpu::Device, &wgpu::Queue),
+    path: &Path,
+    radiance: &Radiance,
+    exposure: f32,
+) -> Result<(), String> {
     let texture = radiance.view().texture();
     let (width, height) = (texture.width(), texture.height());
-    let target = gpu.device.create_texture(&wgpu::TextureDescriptor {
+    let target = device.create_texture(&wgpu::TextureDescriptor {
         label: Some("picture"),
         size: texture.size(),
         mip_level_count: 1,
@@ -36,25 +40,23 @@ pub(crate) fn write_png(gpu: &Gpu, path: &Path, radiance: &Radiance, exposure: f
         usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
         view_formats: &[],
     });
-    let pass = ToneMap::new(&gpu.device, wgpu::TextureFormat::Rgba32Float);
-    let mut resources = ToneMapResources::new(&gpu.device).map_err(|e| e.to_string())?;
+    let pass = ToneMap::new(device, wgpu::TextureFormat::Rgba32Float);
+    let mut resources = ToneMapResources::new(device).map_err(|e| e.to_string())?;
     let settings = ToneMapSettings {
         exposure,
         ..Default::default()
     };
-    let mut encoder = gpu
-        .device
-        .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
     let inputs = ToneMapInputs {
-        queue: &gpu.queue,
+        queue,
         radiance,
         target: &target.create_view(&wgpu::TextureViewDescriptor::default()),
         settings: &settings,
         timestamps: None,
     };
     pass.record(&mut encoder, &mut resources, &inputs);
-    gpu.queue.submit([encoder.finish()]);
-    let display = lightfall::read_rgba32float_blocking(&gpu.device, &gpu.queue, &target).map_err(|e| e.to_string())?;
+    queue.submit([encoder.finish()]);
+    let display = lightfall::read_rgba32float_blocking(device, queue, &target).map_err(|e| e.to_string())?;
     let bytes: Vec<u8> = display
         .iter()
         .flat_map(|p| [p[0], p[1], p[2]].map(|v| (v * 255.0 + 0.5) as u8))
