@@ -177,7 +177,7 @@ fn images_and_statistics_are_written_whole() {
         .map(|v| v.as_u64().unwrap())
         .sum();
     assert_eq!(bytes["total"].as_u64().unwrap(), sum);
-    assert_eq!(stats["plan"].as_array().unwrap().len(), 10);
+    assert_eq!(stats["plan"].as_array().unwrap().len(), 11);
 
     render_to(&[
         "--out",

@@ -42,8 +42,8 @@ fn candidate_area(texel: CandidateTexel) -> f32 {
     return solid_angle * surface.distance * surface.distance / cos_surface;
 }
 
-// Whether a candidate sees the front of a surface at p: it turns towards the candidate, and the texel in its direction
-// shows nothing, or a surface in whose plane p lies or before it.
+// Whether a candidate's map shows the front of a surface at p: it turns towards the candidate, and the texel in its
+// direction holds a surface in whose plane p lies or before it.
 fn candidate_sees(candidate: u32, p: vec3f, normal: vec3f) -> bool {
     let to_p = p - centers[candidate].xyz;
     if dot(normal, to_p) >= 0.0 {
@@ -53,7 +53,7 @@ fn candidate_sees(candidate: u32, p: vec3f, normal: vec3f) -> bool {
     let at = cube_face_texel(point.uv, CANDIDATE_SIZE);
     let surface = candidate_load(candidate, point.face, at);
     if surface.distance <= 0.0 {
-        return true;
+        return false;
     }
     let direction = normalize(cube_face_direction(point.face, (vec2f(at) + 0.5) / f32(CANDIDATE_SIZE)));
     return dot(surface.normal, to_p - direction * surface.distance) >= -params.tolerance;
