@@ -170,6 +170,8 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
     let mut g_buffer = GBuffer::new(device, size).unwrap();
     let irradiance = || Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float).unwrap();
     let (direct, indirect) = (irradiance(), irradiance());
+    let estimated = settings.subsampling.size(size);
+    let coarse = Irradiance::new(device, estimated, settings.splatter_config.format()).unwrap();
     let radiance = Radiance::new(device, size).unwrap();
 
     let mut camera = CameraView::new(&frame, &scene.cameras[0], size, [0.0; 2]);
@@ -250,16 +252,28 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
         photons: &photons,
         g_buffer: &g_buffer,
         subsampling: settings.subsampling,
-        irradiance: &indirect,
+        irradiance: &coarse,
         area: (summary.area / (unit * unit)) as f32,
         radius: frame.radius(),
         settings: &settings.splatter,
         timestamps,
     };
     let config = settings.splatter_config;
-    let mut splatter = PhotonSplatterResources::new(device, &config, &photons, size).unwrap();
+    let mut splatter = PhotonSplatterResources::new(device, &config, &photons, estimated).unwrap();
     let pass = PhotonSplatter::new(device, &config).unwrap();
     pass.record(&mut encoder, &mut splatter, &splatter_inputs);
+    let upsampler_inputs = UpsamplerInputs {
+        queue,
+        g_buffer: &g_buffer,
+        coarse: &coarse,
+        subsampling: settings.subsampling,
+        irradiance: &indirect,
+        settings: &settings.upsampler,
+        timestamps,
+    };
+    // The renderer leaves it out where every pixel is estimated: it would change no bit.
+    let mut upsampler = UpsamplerResources::new(device).unwrap();
+    Upsampler::new(device).record(&mut encoder, &mut upsampler, &upsampler_inputs);
     let composite_inputs = CompositeInputs {
         queue,
         g_buffer: &g_buffer,
@@ -285,32 +299,44 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
 #[test]
 fn the_renderer_equals_the_passes_composed_by_hand_bit_for_bit() {
     let Some(gpu) = gpu() else { return };
-    let (scene, settings, size) = (samples::cornell(0.4), small(), [40, 30]);
-    let mut geometry = MeshGeometry::new(&gpu.device, &gpu.queue, &scene).unwrap();
-    let mut renderer = placed(&gpu, &settings, &scene, &mut geometry);
+    for subsampling in [Subsampling::Full, Subsampling::Quarter] {
+        let settings = Settings { subsampling, ..small() };
+        equals_by_hand(&gpu, &samples::cornell(0.4), &settings, [42, 30]);
+    }
+    assert_no_errors(&gpu);
+}
+
+fn equals_by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2]) {
+    let mut geometry = MeshGeometry::new(&gpu.device, &gpu.queue, scene).unwrap();
+    let mut renderer = placed(gpu, settings, scene, &mut geometry);
     let mut view = renderer.new_view(size).unwrap();
     let encoder = record(
         &mut renderer,
         &mut view,
         &mut geometry,
-        &scene,
+        scene,
         (&gpu.device, &gpu.queue),
     );
     gpu.queue.submit([encoder.finish()]);
     let composed = read_rgba32float_blocking(&gpu.device, &gpu.queue, view.radiance().view().texture()).unwrap();
-    let by_hand = by_hand(&gpu, &scene, &settings, size, renderer.env_maps().unwrap());
+    let by_hand = by_hand(gpu, scene, settings, size, renderer.env_maps().unwrap());
     assert!(composed.iter().flatten().any(|&v| v > 0.0));
     assert!(composed == by_hand);
-    assert_no_errors(&gpu);
 }
 
 #[test]
 fn nothing_is_created_after_the_first_frame_and_memory_use_is_what_was_created() {
+    for subsampling in [Subsampling::Full, Subsampling::Half] {
+        creates_once(&Settings { subsampling, ..small() });
+    }
+}
+
+fn creates_once(settings: &Settings) {
     let (device, queue) = wgpu::Device::noop(&wgpu::DeviceDescriptor::default());
     let scene = samples::cornell(0.0);
     let before = creation_count();
     let mut geometry = MeshGeometry::new(&device, &queue, &scene).unwrap();
-    let mut renderer = GiRenderer::new(&device, &small()).unwrap();
+    let mut renderer = GiRenderer::new(&device, settings).unwrap();
     let mut view = renderer.new_view([64, 48]).unwrap();
     let frame = |time: f64, renderer: &mut GiRenderer, view: &mut ViewResources, geometry: &mut MeshGeometry| {
         let scene = samples::cornell(time);

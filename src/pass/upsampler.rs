@@ -5,7 +5,8 @@
 //! interpolation between the four samples around a pixel).
 //!
 //! A sample weighs as in bilinear interpolation, times how well its normal agrees, times how near it lies to the
-//! receiver's tangent plane. That plane stands for the paper's difference of depth, which a slanted floor has by itself.
+//! receiver's tangent plane, by geometric or shading normal. That plane stands for the paper's difference of depth, which
+//! a slanted floor has by itself.
 //! Distance from it is measured in distances on the screen between receiver and sample, brought to the receiver's depth,
 //! so that scale and angle of view play no part. Weights are over clip-space w: what is linear on a plane is reproduced
 //! exactly, in any view. Where none of the four fits, the sixteen around are tried; where none of those does, the
@@ -60,7 +61,8 @@ pub struct UpsamplerSettings {
 }
 
 impl Default for UpsamplerSettings {
-    /// 45° lets neighbouring facets share light and keeps the walls of a corner apart, as in density estimation.
+    /// 45° lets neighbouring facets share light and keeps the walls of a corner apart, as in density estimation. In a
+    /// Cornell box, cosines from 0.3 to 0.9 and distances from 0.25 to 1 come out the same: see `docs/accuracy.md`.
     fn default() -> Self {
         Self {
             normal_agreement: 0.7,
