@@ -68,6 +68,7 @@ impl Settings {
                 coverage_target: 0.99,
                 ..Default::default()
             },
+            subsampling: Subsampling::Quarter,
             tracer: ImageSpaceTracerSettings {
                 iterations: 5,
                 ..Default::default()
@@ -82,7 +83,7 @@ impl Settings {
             frames: 1,
             photons: 100_000,
             bounces: 3,
-            env_map_count: 8,
+            env_map_count: 12,
             env_map_size: 128,
             shadow_map_size: 512,
             soft_shadow: SoftShadowSettings::default(),
@@ -90,7 +91,7 @@ impl Settings {
             tracer: ImageSpaceTracerSettings::default(),
             splatter_config: PhotonSplatterConfig::default(),
             splatter: PhotonSplatterSettings::default(),
-            subsampling: Subsampling::Full,
+            subsampling: Subsampling::Half,
             upsampler: UpsamplerSettings::default(),
         }
     }
@@ -100,10 +101,11 @@ impl Settings {
         Self {
             frames: 64,
             photons: 200_000,
-            env_map_count: 12,
+            env_map_count: 16,
             env_map_size: 256,
             shadow_map_size: 1024,
             soft_shadow: SoftShadowSettings::accurate(),
+            subsampling: Subsampling::Full,
             splatter: PhotonSplatterSettings {
                 bandwidth: Bandwidth::Density {
                     photons: 20.0,
