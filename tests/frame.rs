@@ -16,6 +16,7 @@ fn small() -> Settings {
         env_map_count: 3,
         env_map_size: 32,
         shadow_map_size: 64,
+        subsampling: Subsampling::Full,
         ..Settings::balanced()
     }
 }
@@ -502,46 +503,93 @@ fn a_mesh_that_the_host_deforms_is_seen_where_it_went() {
     assert_no_errors(&gpu);
 }
 
-#[test]
-fn two_views_of_one_scene_share_its_photons() {
-    let Some(gpu) = gpu() else { return };
+/// Records one frame of several views in one submission and returns their images, and the passes recorded for the scene
+/// and for the views.
+fn record_views(
+    gpu: &Gpu,
+    renderer: &mut GiRenderer,
+    geometry: &mut MeshGeometry,
+    scene: &Scene,
+    views: &mut [&mut ViewResources],
+) -> (Vec<Vec<[f32; 4]>>, [u64; 2]) {
     let (device, queue) = (&gpu.device, &gpu.queue);
-    let scene = samples::cornell(0.0);
-    let mut geometry = MeshGeometry::new(device, queue, &scene).unwrap();
-    let mut renderer = placed(&gpu, &small(), &scene, &mut geometry);
-    let summary = SceneSummary::of(&scene).unwrap();
+    let summary = SceneSummary::of(scene).unwrap();
     let frame = renderer.set_scene(queue, &summary, &scene.lights).unwrap();
-    let sizes = [[32, 32], [24, 16]];
-    let mut views = sizes.map(|size| renderer.new_view(size).unwrap());
-    let mut cameras = sizes.map(|size| CameraView::new(&frame, &scene.cameras[0], size, [0.0; 2]));
-    renderer.prepare(queue, &mut geometry, &mut cameras).unwrap();
+    let mut cameras: Vec<CameraView> = views
+        .iter()
+        .map(|view| CameraView::new(&frame, &scene.cameras[0], view.g_buffer().size(), [0.0; 2]))
+        .collect();
+    renderer.prepare(queue, geometry, &mut cameras).unwrap();
     let mut encoder = device.create_command_encoder(&Default::default());
     let before = creation_count().passes;
     let scene_inputs = SceneInputs {
         queue,
-        geometry: &geometry,
+        geometry,
         sample_offset: 0,
         timestamps: None,
     };
     renderer.record_scene(&mut encoder, &scene_inputs);
-    // Six shadow faces, 18 map faces, emission, walk.
-    assert_eq!(creation_count().passes - before, 6 + 18 + 2);
+    let for_scene = creation_count().passes - before;
     for (view, camera) in views.iter_mut().zip(&cameras) {
         let inputs = ViewInputs {
             queue,
-            geometry: &geometry,
+            geometry,
             view: camera,
             composite: &CompositeSettings::default(),
             timestamps: None,
         };
         renderer.record_view(&mut encoder, view, &inputs).unwrap();
     }
-    // G-buffer, direct light, splatting, composite, twice.
-    assert_eq!(creation_count().passes - before, 26 + 8);
+    let for_views = creation_count().passes - before - for_scene;
     queue.submit([encoder.finish()]);
-    for view in &views {
-        let pixels = read_rgba32float_blocking(device, queue, view.radiance().view().texture()).unwrap();
-        assert!(pixels.iter().filter(|p| p[0] > 0.0).count() > pixels.len() / 2);
+    let read =
+        |view: &&mut ViewResources| read_rgba32float_blocking(device, queue, view.radiance().view().texture()).unwrap();
+    (views.iter().map(read).collect(), [for_scene, for_views])
+}
+
+#[test]
+fn two_views_trace_once_and_each_shows_what_it_shows_alone() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::cornell(0.0);
+    let mut geometry = MeshGeometry::new(&gpu.device, &gpu.queue, &scene).unwrap();
+    let mut renderer = placed(&gpu, &small(), &scene, &mut geometry);
+    let mut wide = renderer.new_view([32, 32]).unwrap();
+    let mut small_view = renderer.new_view([24, 16]).unwrap();
+    let mut show = |views: &mut [&mut ViewResources]| record_views(&gpu, &mut renderer, &mut geometry, &scene, views);
+    let (both, passes) = show(&mut [&mut wide, &mut small_view]);
+    // Six shadow faces, 18 map faces, emission, walk; G-buffer, direct light, splatting, composite, twice.
+    assert_eq!(passes, [6 + 18 + 2, 2 * 4]);
+    assert!(both.iter().flatten().filter(|p| p[0] > 0.0).count() > (32 * 32 + 24 * 16) / 2);
+    let (alone, passes) = show(&mut [&mut small_view]);
+    assert_eq!(passes, [6 + 18 + 2, 4]);
+    assert!(alone[0] == both[1]);
+    assert!(show(&mut [&mut wide]).0[0] == both[0]);
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn a_resized_view_shows_what_a_new_one_of_that_size_shows() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::penumbra(0.0);
+    for subsampling in [Subsampling::Full, Subsampling::Quarter] {
+        let settings = Settings { subsampling, ..small() };
+        let mut geometry = MeshGeometry::new(&gpu.device, &gpu.queue, &scene).unwrap();
+        let mut renderer = placed(&gpu, &settings, &scene, &mut geometry);
+        let mut view = renderer.new_view([48, 20]).unwrap();
+        record_views(&gpu, &mut renderer, &mut geometry, &scene, &mut [&mut view]);
+        for size in [[21, 33], [1, 1], [48, 20]] {
+            renderer.resize_view(&mut view, size).unwrap();
+            let mut fresh = renderer.new_view(size).unwrap();
+            let mut views = [&mut view, &mut fresh];
+            let images = record_views(&gpu, &mut renderer, &mut geometry, &scene, &mut views).0;
+            assert_eq!(images[0].len() as u32, size[0] * size[1]);
+            assert!(images[0] == images[1], "{size:?}");
+        }
+        let texture = view.radiance().view().clone();
+        renderer.resize_view(&mut view, [48, 20]).unwrap();
+        assert_eq!(*view.radiance().view(), texture, "the same size keeps what there is");
+        assert!(renderer.resize_view(&mut view, [0, 7]).is_err());
+        assert_eq!(view.g_buffer().size(), [48, 20], "a refused size changes nothing");
     }
     assert_no_errors(&gpu);
 }

@@ -479,6 +479,18 @@ impl GiRenderer {
         })
     }
 
+    /// Gives a view another size, as when its window is resized; nothing is made anew where the size stays. On an error the
+    /// view is as it was.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`].
+    pub fn resize_view(&self, view: &mut ViewResources, size: [u32; 2]) -> Result<(), Error> {
+        if view.size != size {
+            *view = self.new_view(size)?;
+        }
+        Ok(())
+    }
+
     /// Records one view: its G-buffer, its irradiance, the sum. Two views of one submission need two [`ViewResources`].
     ///
     /// # Errors
