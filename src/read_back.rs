@@ -3,7 +3,7 @@
 
 use crate::{Error, gpu};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// Results that may be on their way at once: two frames in flight and one being read.
 const RING: usize = 3;
@@ -15,6 +15,8 @@ pub(crate) struct ReadBackRing {
     slots: [RingSlot; RING],
     /// Transfers recorded so far; orders them.
     recorded: u64,
+    /// Set when a result will not arrive.
+    lost: Arc<AtomicBool>,
     size: u64,
 }
 
@@ -30,23 +32,30 @@ const FREE: u32 = 0;
 const IN_FLIGHT: u32 = 1;
 const READY: u32 = 2;
 
-/// Frees its slot if the submission it waits for is dropped or fails.
-struct Delivery(Arc<AtomicU32>);
+/// A result under way. If it never arrives, because the commands were not submitted or the device failed, its slot is
+/// freed and the loss is noted.
+struct Delivery {
+    /// Taken on arrival: from then on the slot is the reader's.
+    slot: Option<Arc<AtomicU32>>,
+    lost: Arc<AtomicBool>,
+}
 
 impl Delivery {
-    fn arrive(self, result: Result<(), wgpu::BufferAsyncError>) {
-        if result.is_ok() {
-            self.0.store(READY, Ordering::Release);
+    fn arrive(mut self, result: Result<(), wgpu::BufferAsyncError>) {
+        if result.is_ok()
+            && let Some(slot) = self.slot.take()
+        {
+            slot.store(READY, Ordering::Release);
         }
     }
 }
 
 impl Drop for Delivery {
     fn drop(&mut self) {
-        // Nothing to do where it has arrived.
-        let _ = self
-            .0
-            .compare_exchange(IN_FLIGHT, FREE, Ordering::AcqRel, Ordering::Acquire);
+        if let Some(slot) = self.slot.take() {
+            self.lost.store(true, Ordering::Release);
+            slot.store(FREE, Ordering::Release);
+        }
     }
 }
 
@@ -69,12 +78,12 @@ impl ReadBackRing {
         Ok(Self {
             slots: [slot()?, slot()?, slot()?],
             recorded: 0,
+            lost: Arc::default(),
             size,
         })
     }
 
-    /// Records the transfer of `source`'s first bytes. While all slots are under way the result is not fetched: a later
-    /// one will be.
+    /// Records the transfer of `source`'s first bytes. While all slots are under way the result is lost.
     pub(crate) fn record(&mut self, encoder: &mut wgpu::CommandEncoder, source: &wgpu::Buffer) {
         let Some(slot) = self.slots.iter_mut().find(|s| s.state.load(Ordering::Acquire) == FREE) else {
             return;
@@ -83,10 +92,18 @@ impl ReadBackRing {
         slot.order = self.recorded;
         slot.state.store(IN_FLIGHT, Ordering::Release);
         encoder.copy_buffer_to_buffer(source, 0, &slot.buffer, 0, self.size);
-        let delivery = Delivery(slot.state.clone());
+        let delivery = Delivery {
+            slot: Some(slot.state.clone()),
+            lost: self.lost.clone(),
+        };
         encoder.map_buffer_on_submit(&slot.buffer, wgpu::MapMode::Read, .., move |result| {
             delivery.arrive(result)
         });
+    }
+
+    /// Whether a result has been lost since the last call.
+    pub(crate) fn take_lost(&self) -> bool {
+        self.lost.swap(false, Ordering::AcqRel)
     }
 
     /// The latest result that has arrived; older ones are let go.
@@ -206,4 +223,40 @@ pub(crate) fn read_texels_blocking<T: bytemuck::Pod>(
         .chunks_exact(padded_row as usize)
         .flat_map(|r| bytemuck::pod_collect_to_vec::<u8, T>(&r[..row as usize]))
         .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn delivery() -> (Delivery, Arc<AtomicU32>, Arc<AtomicBool>) {
+        let (slot, lost) = (Arc::new(AtomicU32::new(IN_FLIGHT)), Arc::<AtomicBool>::default());
+        let delivery = Delivery {
+            slot: Some(slot.clone()),
+            lost: lost.clone(),
+        };
+        (delivery, slot, lost)
+    }
+
+    #[test]
+    fn a_result_that_arrives_is_ready_and_one_that_cannot_is_noted() {
+        let (arriving, slot, lost) = delivery();
+        arriving.arrive(Ok(()));
+        assert_eq!(
+            (slot.load(Ordering::Acquire), lost.load(Ordering::Acquire)),
+            (READY, false)
+        );
+        let (failing, slot, lost) = delivery();
+        failing.arrive(Err(wgpu::BufferAsyncError));
+        assert_eq!(
+            (slot.load(Ordering::Acquire), lost.load(Ordering::Acquire)),
+            (FREE, true)
+        );
+        let (dropped, slot, lost) = delivery();
+        drop(dropped);
+        assert_eq!(
+            (slot.load(Ordering::Acquire), lost.load(Ordering::Acquire)),
+            (FREE, true)
+        );
+    }
 }

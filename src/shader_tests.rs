@@ -256,7 +256,7 @@ fn twins() -> Vec<Twin> {
             candidate_count, columns, limit, tag, back_face_limit, clearance, tolerance, coverage_target,
         }),
         twin!(wgsl::ENV_MAP_SELECTOR, "Sight", env_map_selector::gpu::SightRecord {
-            surfaces, back_faces, nearest, is_valid, area, unseen, own, seldom_seen,
+            surfaces, back_faces, nearest, is_valid, area, unseen, own, pad,
         }),
         twin!(wgsl::ENV_MAP_SELECTOR, "Selection", env_map_selector::gpu::SelectionRecord {
             tag, selected, newest, is_done, is_stable, swaps, coverage, pad, chosen,

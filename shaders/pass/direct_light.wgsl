@@ -74,7 +74,7 @@ fn light_pixels(@builtin(global_invocation_id) id: vec3u) {
     textureStore(irradiance, id.xy, vec4f(sum, 1.0));
 }
 
-// Takes what was found beforehand, one layer a light.
+// Takes what was found beforehand, one layer a light and a spare one; tests lights that have none.
 @compute @workgroup_size(8, 8)
 fn light_pixels_by_visibility(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= view.size) {
@@ -85,11 +85,17 @@ fn light_pixels_by_visibility(@builtin(global_invocation_id) id: vec3u) {
         textureStore(irradiance, id.xy, vec4f(0.0));
         return;
     }
+    let layers = textureNumLayers(visibility) - 1u;
     var sum = vec3f(0.0);
     for (var i = 0u; i < params.light_count; i++) {
         let e = unoccluded(lights[i], surface.position, surface.normal);
-        if any(e > vec3f(0.0)) {
+        if !any(e > vec3f(0.0)) {
+            continue;
+        }
+        if i < layers {
             sum += e * textureLoad(visibility, id.xy, i, 0).r;
+        } else if is_lit(lights[i], surface.position, surface.normal) {
+            sum += e;
         }
     }
     textureStore(irradiance, id.xy, vec4f(sum, 1.0));

@@ -97,9 +97,8 @@ impl EnvMapPlacement {
             return Ok(());
         }
         let Some(ongoing) = &mut self.ongoing else {
-            let mut ongoing = OngoingSelection::new(context)?;
-            ongoing.is_pending = self.centers.is_none();
-            self.ongoing = Some(ongoing);
+            // Anything may have changed meanwhile: selected anew, and the old places stay in use until that arrives.
+            self.ongoing = Some(OngoingSelection::new(context)?);
             return Ok(());
         };
         if !ongoing.fits(context) {
@@ -132,7 +131,9 @@ impl EnvMapPlacement {
         match &self.centers {
             Some(world) => world.iter().map(|&c| context.frame.point(c)).collect(),
             None => {
-                let mut candidates = context.candidates();
+                let ongoing = self.ongoing.as_ref();
+                let mut candidates =
+                    ongoing.map_or_else(|| context.candidates(), |o| o.resources.candidates().to_vec());
                 candidates.truncate(context.limit as usize);
                 candidates
             }
@@ -149,6 +150,9 @@ impl EnvMapPlacement {
         let Some(ongoing) = &mut self.ongoing else {
             return false;
         };
+        if ongoing.resources.take_lost() {
+            ongoing.is_pending = true;
+        }
         let Some(selection) = ongoing.resources.take_selection() else {
             return false;
         };
@@ -327,7 +331,7 @@ impl OngoingSelection {
                 (self.is_pending, self.is_started) = (false, true);
                 (self.rounds, self.settles_from) = (MOST_ROUNDS, self.tag);
             }
-            SelectionStep::Maintain => self.rounds -= 1,
+            SelectionStep::Maintain => self.rounds = self.rounds.saturating_sub(1),
         }
         self.part = 0;
         self.tag += 1;

@@ -206,6 +206,7 @@ impl GiRenderer {
         summary: &SceneSummary,
         lights: &[Light],
     ) -> Result<UnitFrame, Error> {
+        self.selection = None;
         for (index, light) in lights.iter().enumerate() {
             light.validate(index)?;
         }
@@ -288,6 +289,15 @@ impl GiRenderer {
         indirect.env_maps.set_centers(queue, &self.placement.centers(&context))
     }
 
+    /// As `apply_centers`, for new places: maps there are switched on, and what was planned for the selection is void.
+    fn renew_centers(&mut self, queue: &wgpu::Queue) -> Result<(), Error> {
+        self.selection = None;
+        if let Some(indirect) = &mut self.indirect {
+            indirect.env_maps.forget_centers();
+        }
+        self.apply_centers(queue)
+    }
+
     /// Selects places for the environment maps. Submits and waits: for headless use and loading screens. Without it the
     /// selection begins with the first frame and arrives some frames later. It prepares the geometry for views of its own:
     /// call it after `set_scene` and before `prepare`.
@@ -301,7 +311,7 @@ impl GiRenderer {
         let context = selection_context(&self.device, queue, &self.settings, state);
         self.placement
             .select_blocking(&self.passes.env_map_selector, &context, geometry)?;
-        self.apply_centers(queue)
+        self.renew_centers(queue)
     }
 
     /// Places the environment maps by hand, world space; up to [`Settings::env_map_count`]. Nothing is selected any more,
@@ -319,10 +329,7 @@ impl GiRenderer {
             });
         }
         self.placement.set_centers(centers);
-        if let Some(indirect) = &mut self.indirect {
-            indirect.env_maps.forget_centers();
-        }
-        self.apply_centers(queue)
+        self.renew_centers(queue)
     }
 
     /// Says that geometry has moved, appeared or gone since the last frame: the selection of places for environment maps
@@ -346,7 +353,7 @@ impl GiRenderer {
             return Ok(());
         };
         if self.placement.take_selection(&frame) {
-            self.apply_centers(queue)?;
+            self.renew_centers(queue)?;
         }
         let Some(state) = &self.state else {
             return Ok(());

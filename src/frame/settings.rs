@@ -61,7 +61,7 @@ impl Settings {
         Self {
             photons: 30_000,
             bounces: 2,
-            env_map_count: 6,
+            env_map_count: 12,
             env_map_size: 64,
             shadow_map_size: 256,
             selector: EnvMapSelectorSettings {

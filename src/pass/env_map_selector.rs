@@ -49,7 +49,7 @@ pub(crate) mod gpu {
         pub(crate) area: f32,
         pub(crate) unseen: f32,
         pub(crate) own: f32,
-        pub(crate) seldom_seen: f32,
+        pub(crate) pad: u32,
     }
 
     /// Twin of `Selection`.
@@ -92,9 +92,6 @@ pub const MAX_SELECTED: u32 = 31;
 /// Swaps tried after the greedy steps; two to five suffice (Yao et al. 2010, section 4.1).
 const MOST_SWAPS: u32 = 8;
 
-/// Greedy steps of a maintenance: they fill places that became invalid.
-const REFILLS: u32 = 2;
-
 /// A surface this share of the region's radius behind a texel's plane is hidden by it. Coarse texels are flat pieces of what
 /// may be curved; a larger share would look through thin walls.
 const TOLERANCE: f32 = 0.004;
@@ -108,15 +105,14 @@ const THINNEST: f32 = 0.1;
 /// What to try, what to accept, and when enough is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnvMapSelectorSettings {
-    /// Candidates, up to 512. More find better places and cost six coarse captures each, and 120 kB.
+    /// Candidates, up to 512. More find better places and cost six coarse captures each, and 150 kB.
     pub candidates: u32,
     /// A candidate that sees more than this share of back faces stands inside a solid.
     pub back_face_limit: f32,
     /// A candidate nearer to a surface than this share of the region's radius sees little else.
     pub clearance: f32,
     /// Share of what all candidates see, by area, at which no further map is added. Higher selects more maps, which cost
-    /// captures and find more of what rays hit; 1: as many as there may be, those beyond full coverage where few others
-    /// see.
+    /// captures and find more of what rays hit; 1: as many as there may be.
     pub coverage_target: f32,
     /// Frames over which all candidates are captured anew while the scene changes; each such round ends with one
     /// maintenance step. More frames are cheaper each and follow changes later.
@@ -178,7 +174,8 @@ pub enum SelectionStep {
     Capture,
     /// Select anew: greedily, then swaps until stable.
     Select,
-    /// One maintenance step of the present selection.
+    /// One maintenance step of the present selection: drops maps whose places became invalid, adds where more is to be
+    /// seen, tries one swap, and does without a map that is not needed any more.
     Maintain,
 }
 
@@ -206,6 +203,8 @@ struct Steps {
     add_for_swap: wgpu::ComputePipeline,
     drop_map: wgpu::ComputePipeline,
     end_steps: wgpu::ComputePipeline,
+    try_without: wgpu::ComputePipeline,
+    keep_if_needed: wgpu::ComputePipeline,
     measure_coverage: wgpu::ComputePipeline,
     switch_maps: wgpu::ComputePipeline,
 }
@@ -294,6 +293,8 @@ impl EnvMapSelector {
             add_for_swap: step!("add_for_swap", &layout),
             drop_map: step!("drop_map", &layout),
             end_steps: step!("end_steps", &layout),
+            try_without: step!("try_without", &layout),
+            keep_if_needed: step!("keep_if_needed", &layout),
             measure_coverage: step!("measure_coverage", &layout),
             switch_maps: step!("switch_maps", &layout, &switch_layout),
         };
@@ -365,7 +366,7 @@ impl EnvMapSelector {
             inputs.timestamps,
         );
         let first = 6 * inputs.candidates.start as u32;
-        for (tile, view) in (first..).zip(inputs.views) {
+        for (tile, view) in (first..6 * resources.capacity).zip(inputs.views) {
             let [x, y] = [tile % resources.columns, tile / resources.columns].map(|i| i * CANDIDATE_SIZE);
             let size = CANDIDATE_SIZE as f32;
             pass.set_viewport(x as f32, y as f32, size, size, 0.0, 1.0);
@@ -420,17 +421,15 @@ impl EnvMapSelector {
             pass.dispatch_workgroups(groups, 1, 1);
         };
         let steps = &self.steps;
-        let (additions, swaps) = match inputs.step {
-            SelectionStep::Select => (limit, MOST_SWAPS),
-            SelectionStep::Maintain | SelectionStep::Capture => (REFILLS, 1),
-        };
-        if inputs.step == SelectionStep::Select {
+        let is_anew = inputs.step == SelectionStep::Select;
+        if is_anew {
             run(&steps.start_anew, 1);
         }
         run(&steps.inspect_candidates, count);
         run(&steps.admit_candidates, 1);
         run(&steps.mark_all, count);
-        for _ in 0..additions {
+        // In a maintenance these fill places that became invalid, and add maps where the scene has grown.
+        for _ in 0..limit {
             run(&steps.sum_unseen, count);
             run(&steps.add_map, 1);
             run(&steps.mark_newest, count);
@@ -438,7 +437,7 @@ impl EnvMapSelector {
         run(&steps.end_steps, 1);
         run(&steps.sum_unseen, count);
         run(&steps.begin_swaps, 1);
-        for _ in 0..swaps {
+        for _ in 0..if is_anew { MOST_SWAPS } else { 1 } {
             run(&steps.sum_unseen, count);
             run(&steps.add_for_swap, 1);
             run(&steps.mark_newest, count);
@@ -447,6 +446,12 @@ impl EnvMapSelector {
         }
         run(&steps.end_steps, 1);
         run(&steps.sum_unseen, count);
+        if !is_anew {
+            run(&steps.try_without, 1);
+            run(&steps.sum_unseen, count);
+            run(&steps.keep_if_needed, 1);
+            run(&steps.sum_unseen, count);
+        }
         run(&steps.measure_coverage, 1);
         if let Some(group) = &switch_group {
             pass.set_bind_group(1, group, &[]);
@@ -620,10 +625,11 @@ impl EnvMapSelectorResources {
         &self.atlas
     }
 
-    /// The views that capture some of the candidates, six each.
+    /// The views that capture some of the candidates, six each; none for those that do not exist.
     pub fn views(&self, candidates: Range<usize>) -> impl Iterator<Item = CaptureView> + '_ {
         let (purpose, mask) = (CapturePurpose::Candidate, CaptureMask::InEnvMaps);
-        self.candidates[candidates].iter().flat_map(move |&center| {
+        let wanted = self.candidates.iter().take(candidates.end).skip(candidates.start);
+        wanted.flat_map(move |&center| {
             (0..6).map(move |face| CaptureView::cube_face(purpose, mask, center, face, CANDIDATE_SIZE))
         })
     }
@@ -633,6 +639,11 @@ impl EnvMapSelectorResources {
     pub fn take_selection(&mut self) -> Option<Selection> {
         let record: gpu::SelectionRecord = self.results.take()?;
         (record.tag >= self.valid_from).then(|| self.selection_of(&record))
+    }
+
+    /// Whether the result of a step will never arrive, because what recorded it was not submitted.
+    pub fn take_lost(&mut self) -> bool {
+        self.results.take_lost()
     }
 
     /// Waits for a submitted step and returns what each candidate sees. Blocks; for headless use.

@@ -30,8 +30,7 @@ struct Sight {
     unseen: f32,
     // Part of it that no selected map but this one sees
     own: f32,
-    // All of it, halved for each selected map that sees it
-    seldom_seen: f32,
+    pad: u32,
 }
 
 struct Selection {
@@ -61,14 +60,11 @@ struct Selection {
 @group(1) @binding(0) var<storage, read_write> map_centers: array<vec4f>;
 
 const NONE: u32 = 0xffffffffu;
-// Where nothing new is to be seen, a second look at the same is still worth something to rays; little enough that a
-// thousandth of new area weighs more.
-const SELDOM_SEEN_WEIGHT: f32 = 0x1p-10;
 const LANES: u32 = 256u;
 
 var<workgroup> counted: array<atomic<u32>, 2>;
 var<workgroup> nearest: atomic<u32>;
-var<workgroup> sums: array<vec3f, LANES>;
+var<workgroup> sums: array<vec2f, LANES>;
 var<workgroup> best: array<vec2f, LANES>;
 var<workgroup> is_done: u32;
 
@@ -82,7 +78,7 @@ fn bit_of_candidate(candidate: u32) -> u32 {
 }
 
 // Adds up what every lane brings, always in the same order.
-fn sum_lanes(lane: u32, value: vec3f) -> vec3f {
+fn sum_lanes(lane: u32, value: vec2f) -> vec2f {
     sums[lane] = value;
     workgroupBarrier();
     for (var half = LANES / 2u; half > 0u; half /= 2u) {
@@ -145,7 +141,7 @@ fn inspect_candidates(@builtin(workgroup_id) group: vec3u, @builtin(local_invoca
         }
         area += candidate_area(texel);
     }
-    let total = sum_lanes(lane, vec3f(area, 0.0, 0.0)).x;
+    let total = sum_lanes(lane, vec2f(area, 0.0)).x;
     if lane == 0u {
         let surfaces = atomicLoad(&counted[0]);
         let back_faces = atomicLoad(&counted[1]);
@@ -153,7 +149,7 @@ fn inspect_candidates(@builtin(workgroup_id) group: vec3u, @builtin(local_invoca
         let is_outside = f32(back_faces) <= params.back_face_limit * f32(surfaces);
         let is_clear = bitcast<f32>(closest) >= params.clearance;
         let is_valid = surfaces > 0u && is_outside && is_clear;
-        sights[candidate] = Sight(surfaces, back_faces, closest, u32(is_valid), total, total, total, total);
+        sights[candidate] = Sight(surfaces, back_faces, closest, u32(is_valid), total, total, total, 0u);
     }
 }
 
@@ -170,7 +166,7 @@ fn admit_candidates(@builtin(local_invocation_index) lane: u32) {
             least_inside = select(least_inside, vec2f(-inside, 0.0), -inside > least_inside.x);
         }
     }
-    valid = sum_lanes(lane, vec3f(valid, 0.0, 0.0)).x;
+    valid = sum_lanes(lane, vec2f(valid, 0.0)).x;
     let share = -best_of_lanes(lane, least_inside).x;
     for (var i = lane; i < params.candidate_count && valid == 0.0; i += LANES) {
         let surfaces = f32(sights[i].surfaces);
@@ -224,7 +220,7 @@ fn mark_newest(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
     }
 }
 
-// A(v | C) of every candidate, A(v | C - v) of those selected, and what is seldom seen.
+// A(v | C) of every candidate, and A(v | C - v) of those selected.
 @compute @workgroup_size(256)
 fn sum_unseen(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let candidate = group.x;
@@ -236,40 +232,36 @@ fn sum_unseen(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
     }
     let bit = bit_of_candidate(candidate);
     let others = selection.selected & ~select(0u, 1u << (bit & 31u), bit != NONE);
-    var sum = vec3f(0.0);
+    var sum = vec2f(0.0);
     for (var i = lane; i < CANDIDATE_TEXELS; i += LANES) {
         let seen = seen_by[candidate * CANDIDATE_TEXELS + i] & selection.selected;
         let area = candidate_area(candidate_texel(candidate, i));
-        let halved = area * exp2(-f32(countOneBits(seen)));
-        sum += vec3f(select(0.0, area, seen == 0u), select(0.0, area, (seen & others) == 0u), halved);
+        sum += vec2f(select(0.0, area, seen == 0u), select(0.0, area, (seen & others) == 0u));
     }
     let total = sum_lanes(lane, sum);
     if lane == 0u {
         sights[candidate].unseen = total.x;
         sights[candidate].own = total.y;
-        sights[candidate].seldom_seen = total.z;
     }
 }
 
 // Of what valid candidates see, the share that selected maps see.
 fn coverage(lane: u32) -> f32 {
-    var area = vec3f(0.0);
+    var area = vec2f(0.0);
     for (var i = lane; i < params.candidate_count; i += LANES) {
-        area += select(vec3f(0.0), vec3f(sights[i].unseen, sights[i].area, 0.0), sights[i].is_valid == 1u);
+        area += select(vec2f(0.0), vec2f(sights[i].unseen, sights[i].area), sights[i].is_valid == 1u);
     }
     let total = sum_lanes(lane, area);
     return select(0.0, 1.0 - total.x / total.y, total.y > 0.0);
 }
 
-// The unselected candidate that sees the most new, or all but nothing new and the most of what few maps see;
-// NONE if there is none left.
+// The unselected candidate that sees the most new, the first of equals; NONE if there is none left.
 fn best_addition(lane: u32) -> u32 {
     var own = vec2f(-1.0, f32(params.candidate_count));
     for (var i = lane; i < params.candidate_count; i += LANES) {
         let is_free = sights[i].is_valid == 1u && bit_of_candidate(i) == NONE;
-        let worth = sights[i].unseen + SELDOM_SEEN_WEIGHT * sights[i].seldom_seen;
-        if is_free && worth > own.x {
-            own = vec2f(worth, f32(i));
+        if is_free && sights[i].unseen > own.x {
+            own = vec2f(sights[i].unseen, f32(i));
         }
     }
     let winner = best_of_lanes(lane, own);
@@ -329,20 +321,26 @@ fn add_for_swap(@builtin(local_invocation_index) lane: u32) {
     }
 }
 
-// Second half: the map that sees the least that no other does. If it is the newest, the selection is stable.
+// Bit of the selected map that sees the least that no other does; `preferred` among equals.
+fn least_own(preferred: u32) -> u32 {
+    var found = preferred;
+    var least = sights[selection.chosen[preferred]].own;
+    for (var bit = 0u; bit < 32u; bit++) {
+        if (selection.selected >> bit & 1u) == 1u && sights[selection.chosen[bit]].own < least {
+            least = sights[selection.chosen[bit]].own;
+            found = bit;
+        }
+    }
+    return found;
+}
+
+// Second half: drops the map that sees the least that no other does. If it is the newest, the selection is stable.
 @compute @workgroup_size(1)
 fn drop_map() {
     if selection.is_done != 0u {
         return;
     }
-    var dropped = selection.newest;
-    var least = sights[selection.chosen[dropped]].own;
-    for (var bit = 0u; bit < 32u; bit++) {
-        if (selection.selected >> bit & 1u) == 1u && sights[selection.chosen[bit]].own < least {
-            least = sights[selection.chosen[bit]].own;
-            dropped = bit;
-        }
-    }
+    let dropped = least_own(selection.newest);
     selection.selected &= ~(1u << dropped);
     if dropped == selection.newest {
         selection.is_done = 1u;
@@ -352,10 +350,36 @@ fn drop_map() {
     }
 }
 
-// What the selection as it now stands covers; the sums must be summed once more for it.
+// So that sums are taken once more, of the selection as it now stands.
 @compute @workgroup_size(1)
 fn end_steps() {
     selection.is_done = 0u;
+}
+
+// A scene that has become simpler may need a map less: tries without the one that sees the least.
+@compute @workgroup_size(256)
+fn try_without(@builtin(local_invocation_index) lane: u32) {
+    let covered = coverage(lane);
+    if lane == 0u {
+        selection.newest = NONE;
+        if is_satisfied(covered) && countOneBits(selection.selected) > 1u {
+            selection.newest = least_own(countTrailingZeros(selection.selected));
+            selection.selected &= ~(1u << selection.newest);
+        }
+    }
+}
+
+// And takes it back where it was needed.
+@compute @workgroup_size(256)
+fn keep_if_needed(@builtin(local_invocation_index) lane: u32) {
+    let covered = coverage(lane);
+    if lane == 0u && selection.newest != NONE {
+        if is_satisfied(covered) {
+            selection.is_stable = 0u;
+        } else {
+            selection.selected |= 1u << selection.newest;
+        }
+    }
 }
 
 @compute @workgroup_size(256)

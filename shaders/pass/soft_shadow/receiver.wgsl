@@ -94,7 +94,8 @@ fn line_pixel(line: Line, steps: f32) -> vec2i {
     if !(clip.w > 0.0 && all(abs(ndc) < vec2f(1.0))) {
         return vec2i(-1);
     }
-    return vec2i((vec2f(0.5, 0.5) + vec2f(0.5, -0.5) * ndc) * vec2f(view.size));
+    // A coordinate just below 1 may round up to the size.
+    return min(vec2i((vec2f(0.5, 0.5) + vec2f(0.5, -0.5) * ndc) * vec2f(view.size)), vec2i(view.size) - 1);
 }
 
 // Weight of the surface at another pixel: how far it lies from the receiver's plane, against the penumbra's radius. Zero
