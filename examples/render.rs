@@ -21,9 +21,6 @@ use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Frames timed when there is nothing to accumulate: a whole round of the selection of places for environment maps.
-const TIMED_FRAMES: u32 = 5;
-
 #[derive(Clone, Copy, ValueEnum)]
 enum Part {
     All,
@@ -179,7 +176,8 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     }
     bar.finish_and_clear();
     if arguments.stats.is_some() {
-        while clock.frames_ms.len() < TIMED_FRAMES as usize {
+        // At least a whole round of the selection of places for environment maps.
+        while clock.frames_ms.len() < settings.selector.interval.max(3) as usize {
             clock.frame(&gpu, &mut offline, timestamps.as_ref())?;
         }
     }
@@ -424,7 +422,7 @@ fn report(gpu: &Gpu, offline: &Offline<'_>, settings: &Settings, clock: &Clock) 
         },
         "energy": energy,
         "env_maps": {
-            "candidates": settings.selector.candidates,
+            "candidates": settings.selector.candidates.max(settings.env_map_count),
             "used": offline.renderer.env_maps().map_or(0, |m| m.centers().len()),
             "coverage": offline.renderer.env_map_coverage(),
         },

@@ -156,6 +156,11 @@ fn images_and_statistics_are_written_whole() {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         assert!(own_lines(&output).is_empty());
     };
+    let render_to_penumbra = |stats: &str| {
+        let scene = ["sample:penumbra", "--stats", stats];
+        let output = render().args(scene).args(small).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    };
     render_to(&["--out", &path("a.exr"), "--stats", &path("a.json")]);
     let image = exr::prelude::read_first_rgba_layer_from_file(
         path("a.exr"),
@@ -177,7 +182,33 @@ fn images_and_statistics_are_written_whole() {
         .map(|v| v.as_u64().unwrap())
         .sum();
     assert_eq!(bytes["total"].as_u64().unwrap(), sum);
-    assert_eq!(stats["plan"].as_array().unwrap().len(), 11);
+    assert_eq!(stats["plan"].as_array().unwrap().len(), 13);
+    // Of a scene in motion, with a lamp that casts penumbrae.
+    render_to_penumbra(&path("p.json"));
+    let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(path("p.json")).unwrap()).unwrap();
+    let stages = stats["time"]["stages"].as_array().unwrap();
+    if stats["time"]["clock"] == "gpu" {
+        for name in [
+            "EnvMapSelector::capture",
+            "EnvMapSelector::select",
+            "NearestOccluder",
+            "SoftShadow::test",
+            "SoftShadow::search",
+            "SoftShadow::blur",
+            "PhotonSplatter",
+            "Upsampler",
+        ] {
+            let stage = stages.iter().find(|s| s["name"] == name);
+            assert!(
+                stage.unwrap_or_else(|| panic!("no {name} in {stages:?}"))["ms"]
+                    .as_f64()
+                    .unwrap()
+                    > 0.0,
+                "{name}"
+            );
+        }
+    }
+    assert!(stats["env_maps"]["coverage"].as_f64().unwrap() > 0.9);
 
     render_to(&[
         "--out",

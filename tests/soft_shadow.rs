@@ -331,7 +331,8 @@ fn a_penumbra_is_as_wide_as_similar_triangles_say() {
                     let measured = width(&profile(camera, SIZE, layer));
                     let (max, rms, pixels) = profile_errors(camera, layer, 0.5 * exact);
                     let ratio = measured / exact;
-                    assert!((ratio - 1.0).abs() < 0.2, "{name}, gap {gap}, {view}, {set}: {ratio}");
+                    // Asked for is a fifth; found are two hundredths.
+                    assert!((ratio - 1.0).abs() < 0.05, "{name}, gap {gap}, {view}, {set}: {ratio}");
                     assert!(max < 0.05 && pixels < 0.05, "{name}, gap {gap}, {view}, {set}");
                     println!(
                         "{name:5} {gap:4} {view:8} {set:8}: {measured:.4} {exact:.4} {:.3}; {max:.3} {rms:.3}; {pixels:.3}",
@@ -373,7 +374,7 @@ fn a_floor_tilted_to_the_sun_stretches_its_penumbra() {
                 let measured = width(&profile(&camera, SIZE, layer));
                 let ratio = measured / exact;
                 println!("{incidence} across {across:5} {set:8}: {measured:.4} {exact:.4} {ratio:.3}");
-                assert!((ratio - 1.0).abs() < 0.2, "{ratio}");
+                assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
             }
         }
     }

@@ -1,8 +1,9 @@
 //! Everything composed: a frame of global illumination from public passes.
 //!
 //! Each frame: [`GiRenderer::set_scene`] (what there is), [`GiRenderer::prepare`] (the host's geometry and every view),
-//! [`GiRenderer::record_scene`] once, [`GiRenderer::record_view`] for each view; then the host submits. Nothing is read
-//! back, submitted or, once settled, allocated on the way.
+//! [`GiRenderer::record_scene`] once, [`GiRenderer::record_view`] for each view; then the host submits. Nothing is waited
+//! for, submitted or, once settled, allocated on the way. One small result comes back by itself: where environment maps
+//! should stand.
 
 use super::env_map_placement::{EnvMapPlacement, PlacementInputs, SelectionContext, Work};
 use super::{Plan, Settings, Stage};

@@ -1,6 +1,7 @@
 //! Model only what the scene requires: which stages run, and why.
 
 use super::Settings;
+use crate::pass::PenumbraSearch;
 use crate::scene::SceneSummary;
 use std::fmt;
 
@@ -11,10 +12,14 @@ pub enum Stage {
     GBufferCapture,
     /// What the lights see.
     ShadowMapCapture,
+    /// How wide penumbrae may be.
+    NearestOccluder,
     /// Penumbrae.
     SoftShadow,
     /// Direct irradiance.
     DirectLight,
+    /// Where environment maps are taken from.
+    EnvMapSelector,
     /// What is around a few points.
     EnvMapCapture,
     /// Photons from lights.
@@ -81,14 +86,20 @@ impl Plan {
         let soft = (light_exists && summary.lights_with_extent > 0, soft);
         let stage = |stage, (on, reason): (bool, String)| PlannedStage { stage, on, reason };
         let always = |reason: &str| (true, reason.to_owned());
-        let maps = (indirect.0, map_reason(&indirect, settings));
+        let nearest = match settings.soft_shadow.search {
+            PenumbraSearch::On => soft.clone(),
+            PenumbraSearch::Off => (false, "settings search no occluders".to_owned()),
+        };
+        let [selection, maps] = map_reasons(&indirect, settings).map(|reason| (indirect.0, reason));
         let upsampling = upsampling(&indirect, settings);
         Self {
             stages: vec![
                 stage(Stage::GBufferCapture, always("every view")),
                 stage(Stage::ShadowMapCapture, lit.clone()),
+                stage(Stage::NearestOccluder, nearest),
                 stage(Stage::SoftShadow, soft),
                 stage(Stage::DirectLight, lit),
+                stage(Stage::EnvMapSelector, selection),
                 stage(Stage::EnvMapCapture, maps),
                 stage(Stage::PhotonEmitter, indirect.clone()),
                 stage(Stage::ImageSpaceTracer, indirect.clone()),
@@ -123,12 +134,19 @@ fn indirect(summary: &SceneSummary, settings: &Settings) -> (bool, String) {
     }
 }
 
-fn map_reason(indirect: &(bool, String), settings: &Settings) -> String {
-    if indirect.0 {
-        format!("{} maps of 6 × {}²", settings.env_map_count, settings.env_map_size)
-    } else {
-        indirect.1.clone()
+/// Of the selection of places for environment maps, and of their capture.
+fn map_reasons(indirect: &(bool, String), settings: &Settings) -> [String; 2] {
+    if !indirect.0 {
+        return [indirect.1.clone(), indirect.1.clone()];
     }
+    let (most, size) = (settings.env_map_count, settings.env_map_size);
+    [
+        format!(
+            "of {} candidates, and while geometry changes",
+            settings.selector.candidates.max(most)
+        ),
+        format!("at most {most} maps of 6 × {size}²"),
+    ]
 }
 
 fn upsampling(indirect: &(bool, String), settings: &Settings) -> (bool, String) {

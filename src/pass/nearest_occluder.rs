@@ -1,9 +1,9 @@
 //! How near to each lamp anything stands, coarsely, so that the search for occluders need not look further than it must.
 //!
 //! Inputs: [`Lights`], [`ShadowMaps`]. Output: [`NearestOccluders`]. Cost: every texel of the shadow maps of lights with an
-//! extent once, for all views; nothing where no light has one. Source: this crate's; Yao et
-//! al., soft shadows and image-space photon mapping, section 3.4, search everywhere as far (Eq. 2). Limits: of occluders nearer to the lamp than five of its radii, those in the way from beyond a tile's
-//! neighbours are overlooked.
+//! extent once, for all views; nothing where no light has one. Source: this crate's; Yao et al., soft shadows and
+//! image-space photon mapping, section 3.4, search everywhere as far (Eq. 2). Limits: of occluders nearer to the lamp than
+//! five of its radii, those in the way from beyond a tile's neighbours are overlooked.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::nearest_occluders::TILES;

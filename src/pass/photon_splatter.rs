@@ -118,8 +118,9 @@ pub enum SplatShape {
     #[default]
     Tiled,
     /// Blended quads, the baseline. Where the size of the G-buffer is no multiple of a sub-sampling factor, the last row
-    /// or column of samples stands up to half a block nearer than quads are drawn for, and misses a rim of them. Sums in `rgba16float` lose about a percent at a hundred photons a pixel and stagnate
-    /// above a thousand; where the device has `FLOAT32_BLENDABLE`, an `rgba32float` target does not.
+    /// or column of samples stands up to half a block nearer than quads are drawn for, and misses a rim of them. Sums in
+    /// `rgba16float` lose about a percent at a hundred photons a pixel and stagnate above a thousand; where the device has
+    /// `FLOAT32_BLENDABLE`, an `rgba32float` target does not.
     Quads,
 }
 
