@@ -97,7 +97,7 @@ impl Settings {
     }
 
     /// Accumulates frames; narrower kernels, finer maps, and as many as there may be: a second look at what one map sees
-    /// halves the error that is left (`docs/accuracy.md`).
+    /// takes a third of the error that is left (`docs/accuracy.md`).
     pub fn accurate() -> Self {
         Self {
             frames: 64,
