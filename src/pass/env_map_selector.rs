@@ -120,7 +120,7 @@ pub struct EnvMapSelectorSettings {
 }
 
 impl Default for EnvMapSelectorSettings {
-    /// A convex room gets one map and a Cornell box eight, whose indirect light has three quarters of the squared error
+    /// A convex room gets one map and a Cornell box eight, whose indirect light has four fifths of the squared error
     /// that the three maps of a target of 0.99 leave (`docs/accuracy.md`).
     fn default() -> Self {
         Self {
