@@ -11,10 +11,10 @@ use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, DirectLight, DirectLightInputs,
     DirectLightResources, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapSelector, GBufferCapture,
     GBufferCaptureInputs, ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, NearestOccluder,
-    NearestOccluderInputs, NearestOccluderResources, PenumbraSearch, PhotonEmitter, PhotonEmitterInputs,
-    PhotonEmitterResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, ShadowMapCapture,
-    ShadowMapCaptureInputs, ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources, Upsampler,
-    UpsamplerInputs, UpsamplerResources,
+    NearestOccluderInputs, NearestOccluderResources, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources,
+    PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, ShadowMapCapture, ShadowMapCaptureInputs,
+    ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources, Upsampler, UpsamplerInputs,
+    UpsamplerResources,
 };
 use crate::resource::{
     CameraView, CapturePurpose, CaptureView, EnvMaps, GBuffer, Geometry, Irradiance, Lights, NearestOccluders, Photons,
@@ -403,7 +403,8 @@ impl GiRenderer {
             .shadow_map_capture
             .record(encoder, &mut direct.capture, &shadow_inputs);
         if let Some((nearest, own)) = &mut direct.soft
-            && self.settings.soft_shadow.search == PenumbraSearch::On
+            && let Some(state) = &self.state
+            && state.plan.is_on(Stage::NearestOccluder)
         {
             let nearest_inputs = NearestOccluderInputs {
                 queue: inputs.queue,

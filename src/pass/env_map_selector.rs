@@ -427,7 +427,9 @@ impl EnvMapSelector {
         }
         run(&steps.inspect_candidates, count);
         run(&steps.admit_candidates, 1);
-        run(&steps.mark_all, count);
+        if !is_anew {
+            run(&steps.mark_all, count);
+        }
         // In a maintenance these fill places that became invalid, and add maps where the scene has grown.
         for _ in 0..limit {
             run(&steps.sum_unseen, count);
@@ -438,11 +440,11 @@ impl EnvMapSelector {
         run(&steps.sum_unseen, count);
         run(&steps.begin_swaps, 1);
         for _ in 0..if is_anew { MOST_SWAPS } else { 1 } {
-            run(&steps.sum_unseen, count);
             run(&steps.add_for_swap, 1);
             run(&steps.mark_newest, count);
             run(&steps.sum_unseen, count);
             run(&steps.drop_map, 1);
+            run(&steps.sum_unseen, count);
         }
         run(&steps.end_steps, 1);
         run(&steps.sum_unseen, count);
