@@ -193,6 +193,8 @@ pub(crate) enum Slot {
     UintTexture,
     /// `texture_2d_array<f32>`, read by `textureLoad` only.
     TextureArray,
+    /// `texture_2d_array<f32>` for filtering.
+    FilteredTextureArray,
     /// `texture_2d_array<u32>`.
     UintArray,
     /// `texture_storage_2d<.., write>`.
@@ -233,6 +235,7 @@ pub(crate) fn layout(
                 Slot::FilteredTexture => texture(wgpu::TextureSampleType::Float { filterable: true }, flat),
                 Slot::UintTexture => texture(wgpu::TextureSampleType::Uint, flat),
                 Slot::TextureArray => texture(wgpu::TextureSampleType::Float { filterable: false }, array),
+                Slot::FilteredTextureArray => texture(wgpu::TextureSampleType::Float { filterable: true }, array),
                 Slot::UintArray => texture(wgpu::TextureSampleType::Uint, array),
                 Slot::StorageTexture(format) => wgpu::BindingType::StorageTexture {
                     access: wgpu::StorageTextureAccess::WriteOnly,
@@ -274,6 +277,7 @@ pub(crate) fn bind_group(
 pub(crate) enum Bound {
     View(wgpu::TextureView),
     Buffer(wgpu::Buffer),
+    Sampler(wgpu::Sampler),
 }
 
 impl From<&wgpu::TextureView> for Bound {
@@ -285,6 +289,12 @@ impl From<&wgpu::TextureView> for Bound {
 impl From<&wgpu::Buffer> for Bound {
     fn from(buffer: &wgpu::Buffer) -> Self {
         Self::Buffer(buffer.clone())
+    }
+}
+
+impl From<&wgpu::Sampler> for Bound {
+    fn from(sampler: &wgpu::Sampler) -> Self {
+        Self::Sampler(sampler.clone())
     }
 }
 
@@ -329,6 +339,7 @@ impl BindGroupCache {
             .map(|b| match b {
                 Bound::View(view) => wgpu::BindingResource::TextureView(view),
                 Bound::Buffer(buffer) => buffer.as_entire_binding(),
+                Bound::Sampler(sampler) => wgpu::BindingResource::Sampler(sampler),
             })
             .collect();
         let group = bind_group(device, label, layout, resources);

@@ -8,6 +8,11 @@ use crate::pass::{
 };
 use crate::resource::{Photon, PhotonState, g_buffer, lights, mesh_geometry, view};
 use crate::wgsl;
+#[cfg(feature = "bvh")]
+use crate::{
+    pass::bvh_tracer,
+    resource::{Ray, RayHit, bvh_geometry, bvh_mesh},
+};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{AddressSpace, Handle, ImageClass, ImageDimension, Literal, ScalarKind, StorageAccess, Type, TypeInner};
 use std::collections::BTreeMap;
@@ -228,6 +233,25 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::IMAGE_SPACE_TRACER, "Params", image_space_tracer::gpu::Params {
             photon_count, bounces, roulette_from, sample_offset, map_count, map_size, iterations, epsilon, row,
         }),
+        #[cfg(feature = "bvh")]
+        twin!(wgsl::BVH_TRACER, "Params", bvh_tracer::gpu::Params { ray_count, row }),
+        #[cfg(feature = "bvh")]
+        twin!(wgsl::BVH_TRACER, "Ray", Ray { origin, furthest, direction, mask }),
+        #[cfg(feature = "bvh")]
+        twin!(wgsl::BVH_TRACER, "RayHit", RayHit {
+            distance, instance, triangle, is_front, barycentric, nodes_visited, triangles_visited,
+        }),
+        #[cfg(feature = "bvh")]
+        twin!(wgsl::BVH_TRACER, "BvhInstance", bvh_geometry::gpu::BvhInstance {
+            to_mesh, to_unit, center, root, first_triangle, material, mask, leaf,
+        }),
+        #[cfg(feature = "bvh")]
+        twin!(wgsl::BVH_TRACER, "BvhMaterial", bvh_geometry::gpu::BvhMaterial {
+            base_color, alpha_cutoff, emission, index_of_refraction, metallic, roughness, transmission,
+            base_color_texture, metallic_roughness_texture, emission_texture, _pad,
+        }),
+        #[cfg(feature = "bvh")]
+        twin!(wgsl::BVH_TRACER, "BvhAttributes", bvh_mesh::gpu::BvhAttributes { tex_coords, triangle, order }),
         twin!(wgsl::PHOTON_SPLATTER_TILED, "Bandwidth", photon_splatter::gpu::Bandwidth {
             scale, uniform_density, lowest, highest,
         }),
@@ -358,6 +382,8 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "MeshGeometry" => vec![&mesh_geometry::SCENE_SLOTS, &mesh_geometry::MATERIAL_SLOTS],
         "PhotonEmitter" => vec![&photon_emitter::SLOTS],
         "ImageSpaceTracer" => vec![&image_space_tracer::SLOTS],
+        #[cfg(feature = "bvh")]
+        "BvhTracer" => vec![&bvh_tracer::SLOTS, &bvh_geometry::BVH_SLOTS],
         "PhotonSplatter tiled" => vec![&photon_splatter::TILED_SLOTS],
         "PhotonSplatter quads" => vec![&photon_splatter::QUAD_SLOTS],
         "DirectLight" => vec![&direct_light::SLOTS, &direct_light::VISIBILITY_SLOTS],
@@ -385,6 +411,7 @@ fn kind_of_slot(slot: Slot) -> String {
         Slot::Texture | Slot::FilteredTexture => "texture_2d<f32>".into(),
         Slot::UintTexture => "texture_2d<u32>".into(),
         Slot::TextureArray => "texture_2d_array<f32>".into(),
+        Slot::FilteredTextureArray => "texture_2d_array<f32>".into(),
         Slot::UintArray => "texture_2d_array<u32>".into(),
         Slot::StorageTexture(format) => format!("texture_storage_2d<{format:?}, write>"),
         Slot::Sampler => "sampler".into(),

@@ -59,6 +59,15 @@ pub(crate) const IMAGE_SPACE_TRACER: &str = compose![
     "common/hash.wgsl",
 ];
 
+#[cfg(feature = "bvh")]
+pub(crate) const BVH_TRACER: &str = compose![
+    "pass/bvh_tracer/trace_rays.wgsl",
+    "pass/bvh_tracer/bindings.wgsl",
+    "common/bvh.wgsl",
+    "common/bvh_surface.wgsl",
+    "common/octahedral.wgsl",
+];
+
 pub(crate) const PHOTON_SPLATTER_TILED: &str = compose![
     "pass/photon_splatter/tiled.wgsl",
     "pass/photon_splatter/splat.wgsl",
@@ -177,10 +186,12 @@ pub(crate) const TRACE_STATISTICS: &str = compose![
 
 /// Every composed module, by the name of its pass; for validation and for tools.
 #[doc(hidden)]
-pub const MODULES: [(&str, &str); 17] = [
+pub const MODULES: &[(&str, &str)] = &[
     ("MeshGeometry", MESH_GEOMETRY),
     ("PhotonEmitter", PHOTON_EMITTER),
     ("ImageSpaceTracer", IMAGE_SPACE_TRACER),
+    #[cfg(feature = "bvh")]
+    ("BvhTracer", BVH_TRACER),
     ("PhotonSplatter tiled", PHOTON_SPLATTER_TILED),
     ("PhotonSplatter quads", PHOTON_SPLATTER_QUADS),
     ("Upsampler", UPSAMPLER),

@@ -5,6 +5,8 @@
 //! the resources at its seams and no other pass.
 
 pub(crate) mod accumulator;
+#[cfg(feature = "bvh")]
+pub(crate) mod bvh_tracer;
 mod capture;
 pub(crate) mod composite;
 pub(crate) mod direct_light;
@@ -23,6 +25,8 @@ pub(crate) mod trace_statistics;
 pub(crate) mod upsampler;
 
 pub use accumulator::{Accumulator, AccumulatorInputs, AccumulatorResources};
+#[cfg(feature = "bvh")]
+pub use bvh_tracer::{BvhTracer, BvhTracerInputs, BvhTracerResources, RayQuery};
 pub use composite::{Composite, CompositeInputs, CompositeResources, CompositeSettings};
 pub use direct_light::{DirectLight, DirectLightInputs, DirectLightResources};
 pub use env_map_capture::{EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources};

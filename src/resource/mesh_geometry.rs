@@ -172,22 +172,8 @@ impl MeshGeometry {
     /// # Errors
     /// [`Error::InvalidScene`] if there is no such instance or the transform is not finite.
     pub fn set_transform(&mut self, instance: usize, transform: DAffine3) -> Result<(), Error> {
-        let (mesh_count, material_count) = (self.meshes.len(), self.materials.len());
-        let Some(current) = self.instances.get_mut(instance) else {
-            return Err(Error::scene(
-                "instance",
-                format!("#{instance}"),
-                "index",
-                "is beyond the last instance",
-            ));
-        };
-        let moved = Instance {
-            transform,
-            ..current.clone()
-        };
-        moved.validate(instance, mesh_count, material_count)?;
-        *current = moved;
-        Ok(())
+        let counts = (self.meshes.len(), self.materials.len());
+        super::move_instance(&mut self.instances, instance, transform, counts)
     }
 
     /// The vertex buffer of a mesh, for the host to write deformed vertices into (from a compute shader or a copy), in
@@ -454,14 +440,7 @@ fn material_groups(
         bytes += texture_bytes;
         views.push(view);
     }
-    let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
-        label: Some("lightfall::MeshGeometry"),
-        address_mode_u: wgpu::AddressMode::Repeat,
-        address_mode_v: wgpu::AddressMode::Repeat,
-        mag_filter: wgpu::FilterMode::Linear,
-        min_filter: wgpu::FilterMode::Linear,
-        ..Default::default()
-    });
+    let sampler = material_sampler(device);
     let view = |texture: Option<usize>| wgpu::BindingResource::TextureView(&views[texture.unwrap_or(views.len() - 1)]);
     let groups = scene
         .materials
@@ -476,6 +455,18 @@ fn material_groups(
         })
         .collect();
     Ok((groups, bytes))
+}
+
+/// How textures of materials are read: coordinates repeat, filtering is linear.
+pub(crate) fn material_sampler(device: &wgpu::Device) -> wgpu::Sampler {
+    device.create_sampler(&wgpu::SamplerDescriptor {
+        label: Some("lightfall::material_sampler"),
+        address_mode_u: wgpu::AddressMode::Repeat,
+        address_mode_v: wgpu::AddressMode::Repeat,
+        mag_filter: wgpu::FilterMode::Linear,
+        min_filter: wgpu::FilterMode::Linear,
+        ..Default::default()
+    })
 }
 
 fn upload_texture(

@@ -3,6 +3,10 @@
 //! A host may make, or take, any of these at any seam. Everything is in the unit frame
 //! ([`UnitFrame`](crate::scene::UnitFrame)) unless its documentation says otherwise.
 
+#[cfg(feature = "bvh")]
+pub(crate) mod bvh_geometry;
+#[cfg(feature = "bvh")]
+pub(crate) mod bvh_mesh;
 pub mod cube_face;
 mod env_maps;
 pub(crate) mod g_buffer;
@@ -13,10 +17,15 @@ pub(crate) mod mesh_geometry;
 pub(crate) mod nearest_occluders;
 mod photons;
 mod radiance;
+mod rays;
 mod shadow_maps;
+#[cfg(feature = "bvh")]
+pub(crate) mod texture_arrays;
 pub(crate) mod view;
 mod visibility;
 
+#[cfg(feature = "bvh")]
+pub use bvh_geometry::{BvhGeometry, BvhGeometryConfig};
 pub use env_maps::EnvMaps;
 pub(crate) use env_maps::SURFACE_FORMAT;
 pub use g_buffer::{GBuffer, GBufferViews, NormalEncoding};
@@ -27,11 +36,34 @@ pub use mesh_geometry::MeshGeometry;
 pub use nearest_occluders::NearestOccluders;
 pub use photons::{PHOTON_BYTES, Photon, PhotonState, Photons};
 pub use radiance::Radiance;
+pub use rays::{Ray, RayHit, Rays};
 pub use shadow_maps::ShadowMaps;
 pub use view::{CameraView, CaptureMask, CapturePurpose, CaptureView};
 pub use visibility::Visibility;
 
 use crate::Error;
+use crate::scene::Instance;
+use glam::DAffine3;
+
+/// Moves one of a list of instances.
+fn move_instance(
+    instances: &mut [Instance],
+    index: usize,
+    transform: DAffine3,
+    (mesh_count, material_count): (usize, usize),
+) -> Result<(), Error> {
+    let Some(current) = instances.get_mut(index) else {
+        let name = format!("#{index}");
+        return Err(Error::scene("instance", name, "index", "is beyond the last instance"));
+    };
+    let moved = Instance {
+        transform,
+        ..current.clone()
+    };
+    moved.validate(index, mesh_count, material_count)?;
+    *current = moved;
+    Ok(())
+}
 
 /// Checks one property of a host-made view.
 fn expect<T: PartialEq + std::fmt::Debug>(

@@ -1,0 +1,428 @@
+//! Meshes, instances and materials of a [`Scene`] as rays meet them: a tree of triangles for each mesh under a tree of
+//! instances.
+
+use super::bvh_mesh::{self, BvhMesh, TOP_LEVELS, build_tree, check_depth};
+use super::texture_arrays::TextureArrays;
+use crate::gpu::{self as device, Bound, Slot};
+use crate::scene::{Instance, Material, Scene, UnitFrame};
+use crate::{Error, resource};
+use glam::{DAffine3, DMat3, Vec3};
+use obvhs::aabb::Aabb;
+use obvhs::cwbvh::node::CwBvhNode;
+
+pub(crate) mod gpu {
+    use bytemuck::{Pod, Zeroable};
+
+    /// Twin of `BvhInstance` in `shaders/common/bvh.wgsl`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct BvhInstance {
+        /// Columns of the linear map from the unit frame to the mesh's.
+        pub(crate) to_mesh: [[f32; 4]; 3],
+        /// Columns of its inverse.
+        pub(crate) to_unit: [[f32; 4]; 3],
+        /// Where the mesh's centre stands in the unit frame.
+        pub(crate) center: [f32; 3],
+        pub(crate) root: u32,
+        pub(crate) first_triangle: u32,
+        pub(crate) material: u32,
+        pub(crate) mask: u32,
+        /// Of the leaf with the number of this record: which record it means.
+        pub(crate) leaf: u32,
+    }
+
+    /// Twin of `BvhMaterial` in `shaders/common/bvh_surface.wgsl`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct BvhMaterial {
+        pub(crate) base_color: [f32; 3],
+        pub(crate) alpha_cutoff: f32,
+        pub(crate) emission: [f32; 3],
+        pub(crate) index_of_refraction: f32,
+        pub(crate) metallic: f32,
+        pub(crate) roughness: f32,
+        pub(crate) transmission: f32,
+        pub(crate) base_color_texture: u32,
+        pub(crate) metallic_roughness_texture: u32,
+        pub(crate) emission_texture: u32,
+        pub(crate) _pad: [u32; 2],
+    }
+}
+
+/// Bindings of group 1 of every shader that traces rays through the trees, in order.
+pub(crate) const BVH_SLOTS: [Slot; 8] = [
+    Slot::Storage,
+    Slot::Storage,
+    Slot::Storage,
+    Slot::Storage,
+    Slot::Storage,
+    Slot::FilteredTextureArray,
+    Slot::FilteredTextureArray,
+    Slot::Sampler,
+];
+
+/// Bytes of a node.
+const NODE_BYTES: u64 = size_of::<CwBvhNode>() as u64;
+
+/// Bits of an instance's mask. Twins of `BVH_ALL`, `BVH_CASTS_SHADOW`, `BVH_IN_ENV_MAPS`, `BVH_HAS_HOLES`.
+pub(crate) const ALL: u32 = 1;
+pub(crate) const CASTS_SHADOW: u32 = 2;
+pub(crate) const IN_ENV_MAPS: u32 = 4;
+pub(crate) const HAS_HOLES: u32 = 8;
+
+/// Speed and memory against accuracy.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BvhGeometryConfig {
+    /// Largest side, in texels, of the textures that rays see, at least 1. All textures of a scene are resampled to
+    /// squares of one size: this, or the longest side of any of them if that is less. Memory grows as the square.
+    pub texture_size: u32,
+}
+
+impl Default for BvhGeometryConfig {
+    fn default() -> Self {
+        Self { texture_size: 1024 }
+    }
+}
+
+/// A scene's triangles on the GPU, for rays.
+///
+/// A tree of eight-wide compressed nodes (Ylitie et al. 2017, built by `obvhs`) for each mesh, and one over the
+/// instances. Bytes on the GPU: 80 a triangle (three corners of position and normal; texture coordinates), 80 a node, of
+/// which a mesh has about one for six triangles, 128 an instance, 64 a material; on the CPU 12 a triangle and 80 a node.
+/// An instance whose transform is singular has no inside to trace in, so rays do not see it.
+#[derive(Debug)]
+pub struct BvhGeometry {
+    meshes: Vec<MeshPlace>,
+    instances: Vec<Instance>,
+    materials: Vec<Material>,
+    nodes: wgpu::Buffer,
+    corners: wgpu::Buffer,
+    attributes: wgpu::Buffer,
+    instance_buffer: wgpu::Buffer,
+    material_buffer: wgpu::Buffer,
+    textures: TextureArrays,
+    prepared: Prepared,
+}
+
+/// A mesh and where its part of the buffers begins.
+#[derive(Debug)]
+struct MeshPlace {
+    mesh: BvhMesh,
+    first_node: u32,
+    first_triangle: u32,
+}
+
+/// What the last `prepare` uploaded, so that only changes are written again.
+#[derive(Debug, Default)]
+struct Prepared {
+    instances: Vec<gpu::BvhInstance>,
+    materials: Vec<gpu::BvhMaterial>,
+    nodes: Vec<CwBvhNode>,
+}
+
+impl BvhGeometry {
+    /// Validates a scene, builds the trees of its meshes and uploads them.
+    ///
+    /// # Errors
+    /// As [`Scene::validate`]; [`Error::LimitExceeded`] for more triangles, nodes or textures than the device holds in one
+    /// binding, or a tree deeper than rays can follow.
+    pub fn new(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        scene: &Scene,
+        config: &BvhGeometryConfig,
+    ) -> Result<Self, Error> {
+        scene.validate()?;
+        let mut built = Vec::with_capacity(scene.meshes.len());
+        let mut meshes: Vec<MeshPlace> = Vec::with_capacity(scene.meshes.len());
+        let top_nodes = scene.instances.len().max(1) as u64;
+        let (mut node_count, mut triangle_count) = (top_nodes, 0);
+        for mesh in &scene.meshes {
+            let (mesh, upload) = BvhMesh::build(mesh)?;
+            let place = MeshPlace {
+                first_node: count(node_count)?,
+                first_triangle: count(triangle_count)?,
+                mesh,
+            };
+            node_count += place.mesh.nodes.len() as u64;
+            triangle_count += place.mesh.triangle_count() as u64;
+            meshes.push(place);
+            built.push(upload);
+        }
+        let storage = |label, size: u64| {
+            use wgpu::BufferUsages as U;
+            device::buffer(device, label, size, U::STORAGE | U::COPY_DST)
+        };
+        let bytes_of = |n: u64, size: usize| n.max(1) * size as u64;
+        let corner_bytes = size_of::<bvh_mesh::gpu::Corner>();
+        let attribute_bytes = size_of::<bvh_mesh::gpu::BvhAttributes>();
+        let geometry = Self {
+            nodes: storage("lightfall::BvhGeometry::nodes", node_count * NODE_BYTES)?,
+            corners: storage(
+                "lightfall::BvhGeometry::corners",
+                bytes_of(3 * triangle_count, corner_bytes),
+            )?,
+            attributes: storage(
+                "lightfall::BvhGeometry::attributes",
+                bytes_of(triangle_count, attribute_bytes),
+            )?,
+            instance_buffer: storage(
+                "lightfall::BvhGeometry::instances",
+                bytes_of(scene.instances.len() as u64, size_of::<gpu::BvhInstance>()),
+            )?,
+            material_buffer: storage(
+                "lightfall::BvhGeometry::materials",
+                bytes_of(scene.materials.len() as u64, size_of::<gpu::BvhMaterial>()),
+            )?,
+            textures: TextureArrays::new(device, queue, scene, config.texture_size.max(1))?,
+            instances: scene.instances.clone(),
+            materials: scene.materials.clone(),
+            meshes,
+            prepared: Prepared::default(),
+        };
+        for (place, upload) in geometry.meshes.iter().zip(&built) {
+            geometry.upload_nodes(queue, place);
+            geometry.upload_corners(queue, place, &upload.corners);
+            let at = u64::from(place.first_triangle) * attribute_bytes as u64;
+            queue.write_buffer(&geometry.attributes, at, bytemuck::cast_slice(&upload.attributes));
+        }
+        Ok(geometry)
+    }
+
+    /// Moves an instance; takes effect at the next [`BvhGeometry::prepare`], which uploads the tree of instances and
+    /// nothing of any mesh.
+    ///
+    /// # Errors
+    /// [`Error::InvalidScene`] if there is no such instance or the transform is not finite.
+    pub fn set_transform(&mut self, instance: usize, transform: DAffine3) -> Result<(), Error> {
+        resource::move_instance(
+            &mut self.instances,
+            instance,
+            transform,
+            (self.meshes.len(), self.materials.len()),
+        )
+    }
+
+    /// Moves the vertices of a mesh, mesh space, and fits its tree to them, on the CPU; instances follow at the next
+    /// [`BvhGeometry::prepare`]. `normals` as in [`Mesh`](crate::scene::Mesh). The tree keeps its shape: after large
+    /// deformations a new `BvhGeometry` is faster to trace.
+    ///
+    /// # Errors
+    /// [`Error::InvalidScene`] if there is no such mesh or a position is not finite; [`Error::CountMismatch`] for another
+    /// number of vertices. Nothing has changed then.
+    pub fn deform(
+        &mut self,
+        queue: &wgpu::Queue,
+        mesh: usize,
+        positions: &[[f32; 3]],
+        normals: &[[f32; 3]],
+    ) -> Result<(), Error> {
+        let Some(place) = self.meshes.get_mut(mesh) else {
+            return Err(Error::scene(
+                "mesh",
+                format!("#{mesh}"),
+                "index",
+                "is beyond the last mesh",
+            ));
+        };
+        let expected = place.mesh.vertex_count();
+        let counts = [
+            ("positions of a deformed mesh", positions.len(), false),
+            ("normals of a deformed mesh", normals.len(), true),
+        ];
+        for (what, found, may_be_none) in counts {
+            if found != expected && !(may_be_none && found == 0) {
+                return Err(Error::CountMismatch { what, expected, found });
+            }
+        }
+        for (field, values) in [("position", positions), ("normal", normals)] {
+            if let Some(at) = values.iter().position(|v| v.iter().any(|x| !x.is_finite())) {
+                let problem = format!("is {:?}, not finite", values[at]);
+                return Err(Error::scene(
+                    "mesh",
+                    format!("#{mesh}"),
+                    format!("{field} of vertex {at}"),
+                    problem,
+                ));
+            }
+        }
+        let corners = place.mesh.refit(positions, normals);
+        let place = &self.meshes[mesh];
+        self.upload_nodes(queue, place);
+        self.upload_corners(queue, place, &corners);
+        Ok(())
+    }
+
+    /// Brings the tree of instances up to date in a frame. Call it once a frame, before passes that trace rays. Returns
+    /// the bytes uploaded: none if nothing moved.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] if the tree is deeper than rays can follow.
+    pub fn prepare(&mut self, queue: &wgpu::Queue, frame: &UnitFrame) -> Result<u64, Error> {
+        let materials: Vec<_> = self.materials.iter().map(|m| self.material_record(frame, m)).collect();
+        let placed: Vec<_> = self.instances.iter().map(|i| self.instance_record(frame, i)).collect();
+        let mut records: Vec<_> = placed.iter().map(|(record, _)| *record).collect();
+        let (seen, boxes): (Vec<u32>, Vec<Aabb>) = (0..)
+            .zip(&placed)
+            .filter_map(|(index, (_, bounds))| bounds.map(|b| (index, b)))
+            .unzip();
+        let tree = build_tree(&boxes);
+        check_depth(&tree, TOP_LEVELS, || format!("{} instances", boxes.len()))?;
+        for (leaf, &seen_index) in tree.primitive_indices.iter().enumerate() {
+            records[leaf].leaf = seen[seen_index as usize];
+        }
+        let mut uploaded = 0;
+        let mut upload = |buffer: &wgpu::Buffer, bytes: &[u8]| {
+            queue.write_buffer(buffer, 0, bytes);
+            uploaded += bytes.len() as u64;
+        };
+        if records != self.prepared.instances {
+            upload(&self.instance_buffer, bytemuck::cast_slice(&records));
+            self.prepared.instances = records;
+        }
+        if tree.nodes != self.prepared.nodes {
+            upload(&self.nodes, bytemuck::cast_slice(&tree.nodes));
+            self.prepared.nodes = tree.nodes;
+        }
+        if materials != self.prepared.materials {
+            upload(&self.material_buffer, bytemuck::cast_slice(&materials));
+            self.prepared.materials = materials;
+        }
+        Ok(uploaded)
+    }
+
+    /// Instances, as last moved.
+    pub fn instances(&self) -> &[Instance] {
+        &self.instances
+    }
+
+    /// Triangles of all meshes.
+    pub fn triangle_count(&self) -> usize {
+        self.meshes.iter().map(|m| m.mesh.triangle_count()).sum()
+    }
+
+    /// Nodes of the trees of all meshes.
+    pub fn node_count(&self) -> usize {
+        self.meshes.iter().map(|m| m.mesh.nodes.len()).sum()
+    }
+
+    /// Bytes of buffers and textures.
+    pub fn memory_use(&self) -> u64 {
+        let buffers = [
+            &self.nodes,
+            &self.corners,
+            &self.attributes,
+            &self.instance_buffer,
+            &self.material_buffer,
+        ];
+        buffers.iter().map(|b| b.size()).sum::<u64>() + self.textures.memory_use()
+    }
+
+    /// Bytes kept on the CPU for refitting.
+    pub fn cpu_memory_use(&self) -> u64 {
+        self.meshes.iter().map(|m| m.mesh.cpu_bytes()).sum()
+    }
+
+    /// What [`BVH_SLOTS`] take.
+    pub(crate) fn bound(&self) -> [Bound; 8] {
+        [
+            (&self.nodes).into(),
+            (&self.corners).into(),
+            (&self.attributes).into(),
+            (&self.instance_buffer).into(),
+            (&self.material_buffer).into(),
+            (&self.textures.srgb).into(),
+            (&self.textures.linear).into(),
+            (&self.textures.sampler).into(),
+        ]
+    }
+
+    fn upload_nodes(&self, queue: &wgpu::Queue, place: &MeshPlace) {
+        let absolute = |node: &CwBvhNode| CwBvhNode {
+            child_base_idx: node.child_base_idx + place.first_node,
+            primitive_base_idx: node.primitive_base_idx + place.first_triangle,
+            ..*node
+        };
+        let nodes: Vec<_> = place.mesh.nodes.iter().map(absolute).collect();
+        let at = u64::from(place.first_node) * NODE_BYTES;
+        queue.write_buffer(&self.nodes, at, bytemuck::cast_slice(&nodes));
+    }
+
+    fn upload_corners(&self, queue: &wgpu::Queue, place: &MeshPlace, corners: &[bvh_mesh::gpu::Corner]) {
+        let at = u64::from(place.first_triangle) * 3 * size_of::<bvh_mesh::gpu::Corner>() as u64;
+        queue.write_buffer(&self.corners, at, bytemuck::cast_slice(corners));
+    }
+
+    /// The record of an instance, and its bounds in the unit frame unless rays cannot meet it.
+    fn instance_record(&self, frame: &UnitFrame, instance: &Instance) -> (gpu::BvhInstance, Option<Aabb>) {
+        let place = &self.meshes[instance.mesh];
+        let mesh_frame = &place.mesh.frame;
+        let world = instance.transform * DAffine3::from_translation(mesh_frame.center);
+        let to_unit = world.matrix3 * (mesh_frame.scale / frame.length_scale());
+        let to_mesh = to_unit.inverse();
+        let center = frame.point(world.translation);
+        let has_holes = self.materials[instance.material].alpha_cutoff.is_some();
+        let mask = [
+            (true, ALL),
+            (instance.casts_shadow, CASTS_SHADOW),
+            (instance.in_env_maps, IN_ENV_MAPS),
+            (has_holes, HAS_HOLES),
+        ];
+        let record = gpu::BvhInstance {
+            to_mesh: columns(&to_mesh),
+            to_unit: columns(&to_unit),
+            center: center.to_array(),
+            root: place.first_node,
+            first_triangle: place.first_triangle,
+            material: instance.material as u32,
+            mask: mask.iter().filter(|m| m.0).map(|m| m.1).sum(),
+            leaf: 0,
+        };
+        let is_invertible = to_mesh.is_finite() && record.to_mesh.iter().flatten().all(|x| x.is_finite());
+        let bounds = place.mesh.bounds.filter(|_| is_invertible).map(|(min, max)| {
+            let corner = |i: usize| Vec3::select(glam::BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), max, min);
+            let points: [_; 8] = std::array::from_fn(|i| {
+                let p = to_unit * corner(i).as_dvec3() + center.as_dvec3();
+                p.as_vec3a()
+            });
+            padded(Aabb::from_points(&points))
+        });
+        (record, bounds)
+    }
+
+    fn material_record(&self, frame: &UnitFrame, material: &Material) -> gpu::BvhMaterial {
+        gpu::BvhMaterial {
+            base_color: material.base_color,
+            alpha_cutoff: material.alpha_cutoff.unwrap_or(0.0),
+            emission: frame.radiance(Vec3::from(material.emission).as_dvec3()).to_array(),
+            index_of_refraction: material.index_of_refraction,
+            metallic: material.metallic,
+            roughness: material.roughness,
+            transmission: material.transmission,
+            base_color_texture: self.textures.layer(material.base_color_texture),
+            metallic_roughness_texture: self.textures.layer(material.metallic_roughness_texture),
+            emission_texture: self.textures.layer(material.emission_texture),
+            _pad: [0; 2],
+        }
+    }
+}
+
+/// A number of nodes or triangles as an index.
+fn count(n: u64) -> Result<u32, Error> {
+    u32::try_from(n).map_err(|_| Error::LimitExceeded {
+        what: "nodes or triangles of a scene".into(),
+        needed: n,
+        limit: u64::from(u32::MAX),
+        remedy: "leave out some meshes",
+    })
+}
+
+/// Grown by what rounding may have moved a corner.
+fn padded(bounds: Aabb) -> Aabb {
+    let pad = f32::EPSILON * bounds.min.abs().max(bounds.max.abs()).max_element();
+    Aabb::new(bounds.min - pad, bounds.max + pad)
+}
+
+fn columns(m: &DMat3) -> [[f32; 4]; 3] {
+    [m.x_axis, m.y_axis, m.z_axis].map(|c| c.as_vec3().extend(0.0).to_array())
+}
