@@ -9,7 +9,7 @@ pub enum Error {
     /// A mesh, instance, material, texture, light or camera holds something that cannot be rendered.
     #[error("{item} {name:?}: {field} {problem}")]
     InvalidScene {
-        /// What kind of thing it is: "mesh", "instance", "material", "texture", "light", "camera", "summary".
+        /// What kind of thing it is: "mesh", "instance", "material", "texture", "light", "environment", "camera", "summary".
         item: &'static str,
         /// Its name, or its index where it has none.
         name: String,

@@ -6,6 +6,8 @@ use crate::pass::{
     accumulator, composite, direct_light, env_map_selector, image_space_tracer, nearest_occluder, photon_emitter,
     photon_splatter, soft_shadow, tone_map, trace_statistics, upsampler,
 };
+#[cfg(all(feature = "bvh", feature = "reference"))]
+use crate::reference::{emitters, path_tracer};
 use crate::resource::{Photon, PhotonState, g_buffer, lights, mesh_geometry, view};
 use crate::wgsl;
 #[cfg(feature = "bvh")]
@@ -252,6 +254,18 @@ fn twins() -> Vec<Twin> {
         }),
         #[cfg(feature = "bvh")]
         twin!(wgsl::BVH_TRACER, "BvhAttributes", bvh_mesh::gpu::BvhAttributes { tex_coords, triangle, order }),
+        #[cfg(all(feature = "bvh", feature = "reference"))]
+        twin!(wgsl::PATH_TRACER, "Params", path_tracer::gpu::Params {
+            eye, is_parallel, forward, sample, right, bounces, up, roulette_from, size, component, emitter_count,
+            rectangle_count, pick_per_area, environment_pick, environment_norm, environment_size, environment_rotation,
+            _pad,
+        }),
+        #[cfg(all(feature = "bvh", feature = "reference"))]
+        twin!(wgsl::PATH_TRACER, "Emitter", emitters::gpu::Emitter {
+            position, kind, u, pick_until, v, pick, strength, extent, inner, outer, material, _pad, tex_coords, _pad_end,
+        }),
+        #[cfg(all(feature = "bvh", feature = "reference"))]
+        twin!(wgsl::PATH_TRACER_RESOLVE, "Params", path_tracer::gpu::ResolveParams { width, output_scale }),
         twin!(wgsl::PHOTON_SPLATTER_TILED, "Bandwidth", photon_splatter::gpu::Bandwidth {
             scale, uniform_density, lowest, highest,
         }),
@@ -398,6 +412,10 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "EnvMapSelector" => vec![&env_map_selector::SLOTS, &env_map_selector::SWITCH_SLOTS],
         "EnvMapSelector clear" => vec![],
         "TraceStatistics" => vec![&trace_statistics::SLOTS],
+        #[cfg(all(feature = "bvh", feature = "reference"))]
+        "PathTracer" => vec![&path_tracer::SLOTS, &bvh_geometry::BVH_SLOTS],
+        #[cfg(all(feature = "bvh", feature = "reference"))]
+        "PathTracer resolve" => vec![&path_tracer::RESOLVE_SLOTS],
         _ => panic!("which layouts has {module}?"),
     }
 }

@@ -184,6 +184,24 @@ pub(crate) const TRACE_STATISTICS: &str = compose![
     "common/reflectance.wgsl",
 ];
 
+#[cfg(all(feature = "bvh", feature = "reference"))]
+pub(crate) const PATH_TRACER: &str = compose![
+    "reference/path_tracer/trace_paths.wgsl",
+    "reference/path_tracer/emitters.wgsl",
+    "reference/path_tracer/scatter.wgsl",
+    "pass/bvh_tracer/bindings.wgsl",
+    "common/bvh.wgsl",
+    "common/bvh_surface.wgsl",
+    "common/ggx.wgsl",
+    "common/fresnel.wgsl",
+    "common/octahedral.wgsl",
+    "common/sampling.wgsl",
+    "common/hash.wgsl",
+];
+
+#[cfg(all(feature = "bvh", feature = "reference"))]
+pub(crate) const PATH_TRACER_RESOLVE: &str = compose!["reference/path_tracer/resolve.wgsl", "common/full_screen.wgsl"];
+
 /// Every composed module, by the name of its pass; for validation and for tools.
 #[doc(hidden)]
 pub const MODULES: &[(&str, &str)] = &[
@@ -206,6 +224,10 @@ pub const MODULES: &[(&str, &str)] = &[
     ("EnvMapSelector", ENV_MAP_SELECTOR),
     ("EnvMapSelector clear", ENV_MAP_SELECTOR_CLEAR),
     ("TraceStatistics", TRACE_STATISTICS),
+    #[cfg(all(feature = "bvh", feature = "reference"))]
+    ("PathTracer", PATH_TRACER),
+    #[cfg(all(feature = "bvh", feature = "reference"))]
+    ("PathTracer resolve", PATH_TRACER_RESOLVE),
 ];
 
 /// Functions of `shaders/common/` that tests compare with `f64` twins.

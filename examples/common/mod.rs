@@ -7,5 +7,7 @@ pub(crate) mod exr_file;
 pub(crate) mod gltf_scene;
 pub(crate) mod offline;
 pub(crate) mod picture;
+#[cfg(all(feature = "bvh", feature = "reference"))]
+pub(crate) mod reference;
 #[cfg(feature = "reference")]
 pub(crate) mod truth_file;

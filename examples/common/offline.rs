@@ -207,7 +207,8 @@ pub(crate) fn render(
     offline.read()
 }
 
-fn wait(device: &wgpu::Device) -> Result<(), Error> {
+/// Waits for all that was submitted.
+pub(crate) fn wait(device: &wgpu::Device) -> Result<(), Error> {
     device
         .poll(wgpu::PollType::wait_indefinitely())
         .map(drop)

@@ -66,9 +66,10 @@ pub struct Plan {
 impl Plan {
     /// Decides from what is in the scene and what the settings allow.
     pub fn for_scene(summary: &SceneSummary, settings: &Settings) -> Self {
-        let light_exists = summary.lights > 0;
+        let punctual = punctual_lights(summary);
+        let light_exists = punctual > 0;
         let lit = if light_exists {
-            (true, format!("{} light(s)", summary.lights))
+            (true, format!("{punctual} light(s)"))
         } else {
             (false, "no light".to_owned())
         };
@@ -118,9 +119,14 @@ impl Plan {
     }
 }
 
+/// Lights that the stages of a frame model.
+fn punctual_lights(summary: &SceneSummary) -> usize {
+    summary.lights.saturating_sub(summary.area_lights)
+}
+
 fn indirect(summary: &SceneSummary, settings: &Settings) -> (bool, String) {
     let off = |reason: &str| (false, reason.to_owned());
-    if summary.lights == 0 {
+    if punctual_lights(summary) == 0 {
         off("no light")
     } else if !summary.has_reflecting_surfaces {
         off("every surface is black")
@@ -173,6 +179,12 @@ fn simplifications(summary: &SceneSummary) -> Vec<String> {
     if !summary.dielectrics.is_empty() {
         notes.push(format!("glass, treated as Lambertian: {}", list(&summary.dielectrics)));
     }
+    if summary.area_lights > 0 {
+        notes.push(format!(
+            "{} rectangle or environment light(s): light nothing",
+            summary.area_lights
+        ));
+    }
     if summary.lights_with_extent > 0 {
         notes.push(format!(
             "{} light(s) with an extent: photons start at the centre, irradiance is a point's",
@@ -209,6 +221,7 @@ mod tests {
             triangles: 12,
             total_flux: 1.0,
             lights: 1,
+            area_lights: 0,
             lights_with_extent: 0,
             has_reflecting_surfaces: true,
             emissive: Vec::new(),
@@ -267,10 +280,18 @@ mod tests {
             metals: vec!["chrome".into()],
             dielectrics: vec!["window".into()],
             lights_with_extent: 1,
+            lights: 3,
+            area_lights: 2,
             ..summary()
         };
         let text = Plan::for_scene(&summary, &Settings::balanced()).to_string();
-        for name in ["ceiling lamp", "chrome", "window", "irradiance is a point's"] {
+        for name in [
+            "ceiling lamp",
+            "chrome",
+            "window",
+            "irradiance is a point's",
+            "2 rectangle",
+        ] {
             assert!(text.contains(name), "{name} in\n{text}");
         }
     }

@@ -73,7 +73,8 @@ impl Lights {
     }
 
     /// Uploads the lights of this frame. `photon_count` photons are divided among them: three quarters in proportion to
-    /// flux, one quarter evenly among those that shine. Shadow-map layers are numbered as [`ShadowMaps`] does.
+    /// flux, one quarter evenly among those that shine. Shadow-map layers are numbered as [`ShadowMaps`] does. Lights that
+    /// are not punctual are left out.
     ///
     /// # Errors
     /// [`Error::CountMismatch`] above [`MAX_LIGHTS`].
@@ -91,7 +92,8 @@ impl Lights {
                 found: lights.len(),
             });
         }
-        let counts = divide_photons(frame, lights, photon_count);
+        let lights: Vec<_> = lights.iter().filter(|l| l.is_punctual()).cloned().collect();
+        let counts = divide_photons(frame, &lights, photon_count);
         let mut records = Vec::with_capacity(lights.len());
         let (mut first_layer, mut first_photon) = (0, 0);
         for (light, &count) in lights.iter().zip(&counts) {
@@ -195,6 +197,7 @@ fn record(frame: &UnitFrame, light: &Light, first_layer: u32, first_photon: u32,
             let radius = f64::from(frame.radius());
             density = 1.0 / (std::f64::consts::PI * radius * radius);
         }
+        LightKind::Rectangle { .. } | LightKind::Environment { .. } => unreachable!("only punctual lights are written"),
     }
     gpu::LightRecord {
         position: position.to_array(),

@@ -27,7 +27,7 @@ pub struct ShadowMaps {
 }
 
 impl ShadowMaps {
-    /// Layers that these lights need.
+    /// Layers that these lights need: none for those that are not punctual.
     pub fn layers(lights: &[Light]) -> u32 {
         lights.iter().map(|l| layers_of(&l.kind)).sum()
     }
@@ -80,6 +80,7 @@ impl ShadowMaps {
                         views.extend((0..6).map(|f| CaptureView::cube_face(purpose, mask, eye, f, self.size)));
                     }
                 }
+                LightKind::Rectangle { .. } | LightKind::Environment { .. } => {}
             }
         }
         views
@@ -88,7 +89,9 @@ impl ShadowMaps {
     /// How a light looks at the scene.
     pub(super) fn light_shape(frame: &UnitFrame, light: &Light) -> LightShape {
         let (direction, half_extent) = match light.kind {
-            LightKind::Point { .. } => (DVec3::NEG_Y, 1.0),
+            LightKind::Point { .. } | LightKind::Rectangle { .. } | LightKind::Environment { .. } => {
+                (DVec3::NEG_Y, 1.0)
+            }
             LightKind::Spot {
                 direction, outer_angle, ..
             } if outer_angle <= WIDEST_SINGLE_FACE => (direction, outer_angle.tan() * (1.0 + MARGIN)),
@@ -128,5 +131,6 @@ fn layers_of(kind: &LightKind) -> u32 {
         LightKind::Point { .. } => 6,
         LightKind::Spot { outer_angle, .. } if *outer_angle > WIDEST_SINGLE_FACE => 6,
         LightKind::Spot { .. } | LightKind::Directional { .. } => 1,
+        LightKind::Rectangle { .. } | LightKind::Environment { .. } => 0,
     }
 }

@@ -1,4 +1,5 @@
-//! Light sources without geometry, by the conventions of `KHR_lights_punctual` without luminous efficacy.
+//! Light sources without geometry; point, spot and directional ones by the conventions of `KHR_lights_punctual` without
+//! luminous efficacy.
 
 use super::name_or_index;
 use crate::Error;
@@ -35,6 +36,24 @@ pub enum LightKind {
         /// Half the angle that the source subtends, radians; 0 gives hard shadows.
         angle: f64,
     },
+    /// A flat lamp that shines from its front with equal radiance in all directions. It blocks nothing; reflections show
+    /// it, the eye does not see it directly.
+    Rectangle {
+        /// World position of its middle.
+        center: DVec3,
+        /// From the middle to the middle of one edge, world units.
+        half_u: DVec3,
+        /// From the middle to the middle of the next edge. `half_u` × `half_v` points out of the front; they need not be
+        /// perpendicular.
+        half_v: DVec3,
+    },
+    /// Light from infinitely far away, all around. A scene has at most one.
+    Environment {
+        /// Index into [`Scene::environments`](super::Scene::environments); `None`: the same radiance everywhere.
+        image: Option<usize>,
+        /// Turn about +Y, radians.
+        rotation: f64,
+    },
 }
 
 /// A light source.
@@ -46,8 +65,8 @@ pub struct Light {
     pub kind: LightKind,
     /// Linear RGB factor, not negative.
     pub color: [f32; 3],
-    /// Times `color`: radiant intensity in W/sr (point, spot), or irradiance on a perpendicular plane in W/m²
-    /// (directional). Not negative.
+    /// Times `color`: radiant intensity in W/sr (point, spot), irradiance on a perpendicular plane in W/m² (directional), or
+    /// radiance in W/m²/sr (rectangle; environment, where it multiplies the image). Not negative.
     pub intensity: f32,
 }
 
@@ -68,7 +87,7 @@ impl Light {
     }
 
     /// Solid angle that a light of full intensity would fill to emit the same flux, sr. A point light's is 4π; of a
-    /// spot's falloff ((cosθ − cos o)/(cos i − cos o))² the penumbra counts a third. Zero for directional lights.
+    /// spot's falloff ((cosθ − cos o)/(cos i − cos o))² the penumbra counts a third. Zero for lights without an intensity.
     pub fn effective_solid_angle(&self) -> f64 {
         match self.kind {
             LightKind::Point { .. } => 4.0 * PI,
@@ -80,16 +99,26 @@ impl Light {
                 let (inner, outer) = (one_minus_cos(inner_angle), one_minus_cos(outer_angle));
                 2.0 * PI * (inner + (outer - inner) / 3.0)
             }
-            LightKind::Directional { .. } => 0.0,
+            LightKind::Directional { .. } | LightKind::Rectangle { .. } | LightKind::Environment { .. } => 0.0,
         }
     }
 
-    /// Radiant flux, W, per channel. A directional light's is what crosses a disc of `region_radius`.
+    /// Radiant flux, W, per channel. A directional light's is what crosses a disc of `region_radius`; an environment's is
+    /// what enters a sphere of that radius, without its image.
     pub fn flux(&self, region_radius: f64) -> DVec3 {
+        let disc = PI * region_radius * region_radius;
         match self.kind {
-            LightKind::Directional { .. } => self.strength() * PI * region_radius * region_radius,
-            _ => self.strength() * self.effective_solid_angle(),
+            LightKind::Directional { .. } => self.strength() * disc,
+            LightKind::Rectangle { half_u, half_v, .. } => self.strength() * PI * 4.0 * half_u.cross(half_v).length(),
+            // Irradiance π L on each of the sphere's four discs of area.
+            LightKind::Environment { .. } => self.strength() * PI * 4.0 * disc,
+            LightKind::Point { .. } | LightKind::Spot { .. } => self.strength() * self.effective_solid_angle(),
         }
+    }
+
+    /// Whether it is a point, spot or directional light: what shadow maps and photons start from.
+    pub fn is_punctual(&self) -> bool {
+        !matches!(self.kind, LightKind::Rectangle { .. } | LightKind::Environment { .. })
     }
 
     /// Whether the light has an extent, and so a penumbra.
@@ -97,6 +126,7 @@ impl Light {
         match self.kind {
             LightKind::Point { radius, .. } | LightKind::Spot { radius, .. } => radius > 0.0,
             LightKind::Directional { angle, .. } => angle > 0.0,
+            LightKind::Rectangle { .. } | LightKind::Environment { .. } => true,
         }
     }
 
@@ -128,6 +158,22 @@ impl Light {
                 ..
             } => (position, direction, radius, f64::MAX),
             LightKind::Directional { direction, angle } => (DVec3::ZERO, direction, angle, 0.5 * PI),
+            LightKind::Rectangle { center, half_u, half_v } => {
+                let area = 4.0 * half_u.cross(half_v).length();
+                if !(area > 0.0 && area.is_finite()) {
+                    return error(
+                        "half_u and half_v",
+                        format!("span an area of {area}; expected finite and above zero"),
+                    );
+                }
+                (center, DVec3::X, 0.0, f64::MAX)
+            }
+            LightKind::Environment { rotation, .. } => {
+                if !rotation.is_finite() {
+                    return error("rotation", format!("is {rotation}, not finite"));
+                }
+                (DVec3::ZERO, DVec3::X, 0.0, f64::MAX)
+            }
         };
         if !position.is_finite() {
             return error("position", format!("is {position}, not finite"));

@@ -5,6 +5,7 @@
 
 mod bounds;
 mod camera;
+mod environment;
 mod instance;
 mod light;
 mod material;
@@ -16,6 +17,7 @@ mod unit_frame;
 
 pub use bounds::SceneBounds;
 pub use camera::{Camera, Projection};
+pub use environment::EnvironmentImage;
 pub use instance::Instance;
 pub(crate) use light::one_minus_cos;
 pub use light::{Light, LightKind};
@@ -40,6 +42,8 @@ pub struct Scene {
     pub instances: Vec<Instance>,
     /// Light sources without geometry. Emissive materials shine by themselves.
     pub lights: Vec<Light>,
+    /// Images that environment lights refer to.
+    pub environments: Vec<EnvironmentImage>,
     /// View points.
     pub cameras: Vec<Camera>,
 }
@@ -66,11 +70,37 @@ impl Scene {
         for (index, light) in self.lights.iter().enumerate() {
             light.validate(index)?;
         }
+        self.validate_environments()?;
         for (index, camera) in self.cameras.iter().enumerate() {
             camera.validate(index)?;
         }
         if self.triangle_count() > 0 {
             self.bounds()?;
+        }
+        Ok(())
+    }
+
+    /// Checks images, references to them, and that there is one environment at most.
+    fn validate_environments(&self) -> Result<(), Error> {
+        for (index, image) in self.environments.iter().enumerate() {
+            image.validate(index)?;
+        }
+        let mut found = false;
+        for (index, light) in self.lights.iter().enumerate() {
+            let LightKind::Environment { image, .. } = light.kind else {
+                continue;
+            };
+            let error = |field: &str, problem: String| {
+                Err(Error::scene("light", name_or_index(&light.name, index), field, problem))
+            };
+            if let Some(image) = image.filter(|&i| i >= self.environments.len()) {
+                let count = self.environments.len();
+                return error("image", format!("is {image}, but there are {count} environments"));
+            }
+            if found {
+                return error("kind", "is a second environment; a scene has one at most".into());
+            }
+            found = true;
         }
         Ok(())
     }

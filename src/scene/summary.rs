@@ -1,6 +1,6 @@
 //! What a scene holds, in the few numbers that decide which stages it needs.
 
-use super::{Scene, SceneBounds};
+use super::{LightKind, Scene, SceneBounds};
 use crate::Error;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -16,9 +16,11 @@ pub struct SceneSummary {
     pub triangles: usize,
     /// Flux of all lights and emitting surfaces, W, summed over channels.
     pub total_flux: f64,
-    /// Lights without geometry.
+    /// Lights without geometry, of every kind.
     pub lights: usize,
-    /// Lights with an extent, hence a penumbra.
+    /// Those of them that are not punctual ([`Light::is_punctual`](super::Light::is_punctual)).
+    pub area_lights: usize,
+    /// Punctual lights with an extent, hence a penumbra.
     pub lights_with_extent: usize,
     /// Whether any surface reflects light at all.
     pub has_reflecting_surfaces: bool,
@@ -45,6 +47,10 @@ impl SceneSummary {
         }
         if !(self.total_flux >= 0.0 && self.total_flux.is_finite()) {
             return error("total_flux", self.total_flux);
+        }
+        if self.area_lights > self.lights {
+            let problem = format!("is {}, but there are {} lights in all", self.area_lights, self.lights);
+            return Err(Error::scene("summary", "scene", "area_lights", problem));
         }
         if self.lights != light_count {
             return Err(Error::CountMismatch {
@@ -73,7 +79,11 @@ impl SceneSummary {
             total_flux += emission.element_sum() * PI * own_area;
         }
         for light in &scene.lights {
-            total_flux += light.flux(bounds.radius()).element_sum();
+            let factor = match light.kind {
+                LightKind::Environment { image: Some(image), .. } => scene.environments.get(image).map(|i| i.mean()),
+                _ => None,
+            };
+            total_flux += (light.flux(bounds.radius()) * factor.unwrap_or(DVec3::ONE)).element_sum();
         }
         let names = |wanted: fn(&super::Material) -> bool| {
             let in_use = scene
@@ -91,7 +101,12 @@ impl SceneSummary {
             triangles: scene.triangle_count(),
             total_flux,
             lights: scene.lights.len(),
-            lights_with_extent: scene.lights.iter().filter(|l| l.has_extent()).count(),
+            area_lights: scene.lights.iter().filter(|l| !l.is_punctual()).count(),
+            lights_with_extent: scene
+                .lights
+                .iter()
+                .filter(|l| l.is_punctual() && l.has_extent())
+                .count(),
             has_reflecting_surfaces: !names(|m| m.base_color.iter().any(|&c| c > 0.0)).is_empty(),
             emissive: names(super::Material::is_emissive),
             metals: names(super::Material::is_metal),

@@ -1,0 +1,98 @@
+//! Renders a scene by path tracing: the same camera and components as `offline`, without its approximations.
+
+use super::adapter::Gpu;
+use lightfall::reference::{
+    Emitters, PathEstimate, PathTracer, PathTracerInputs, PathTracerResources, PathTracerSettings,
+};
+use lightfall::resource::{BvhGeometry, BvhGeometryConfig, Radiance};
+use lightfall::scene::{Scene, SceneSummary, UnitFrame};
+use lightfall::{Error, Timestamps};
+
+/// A scene on the GPU and what its paths have brought so far.
+pub(crate) struct Reference<'a> {
+    gpu: &'a Gpu,
+    tracer: PathTracer,
+    resources: PathTracerResources,
+    geometry: BvhGeometry,
+    emitters: Emitters,
+    frame: UnitFrame,
+    scene: Scene,
+    camera: usize,
+    settings: PathTracerSettings,
+    size: [u32; 2],
+}
+
+impl<'a> Reference<'a> {
+    /// Builds the trees and uploads the scene.
+    pub(crate) fn new(
+        gpu: &'a Gpu,
+        scene: Scene,
+        settings: &PathTracerSettings,
+        camera: usize,
+        size: [u32; 2],
+    ) -> Result<Self, Error> {
+        let (device, queue) = (&gpu.device, &gpu.queue);
+        let summary = SceneSummary::of(&scene)?;
+        let frame = UnitFrame::new(&summary.bounds, summary.total_flux)?;
+        let mut geometry = BvhGeometry::new(device, queue, &scene, &BvhGeometryConfig::default())?;
+        geometry.prepare(queue, &frame)?;
+        Ok(Self {
+            gpu,
+            tracer: PathTracer::new(device),
+            resources: PathTracerResources::new(device, size)?,
+            geometry,
+            emitters: Emitters::new(device, queue, &frame, &scene)?,
+            frame,
+            scene,
+            camera,
+            settings: *settings,
+            size,
+        })
+    }
+
+    /// Traces one more path for each pixel and waits for them.
+    pub(crate) fn render_sample(&mut self, timestamps: Option<&Timestamps>) -> Result<(), Error> {
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let inputs = PathTracerInputs {
+            queue: &self.gpu.queue,
+            frame: &self.frame,
+            geometry: &self.geometry,
+            emitters: &self.emitters,
+            camera: &self.scene.cameras[self.camera],
+            settings: &self.settings,
+            timestamps,
+        };
+        self.tracer.record(&mut encoder, &mut self.resources, &inputs);
+        if let Some(timestamps) = timestamps {
+            timestamps.resolve(&mut encoder);
+        }
+        self.gpu.queue.submit([encoder.finish()]);
+        super::offline::wait(&self.gpu.device)
+    }
+
+    /// The mean of all samples and its standard error.
+    pub(crate) fn read(&self) -> Result<PathEstimate, Error> {
+        self.resources
+            .read_blocking(&self.gpu.device, &self.gpu.queue, &self.frame)
+    }
+
+    /// The mean as an image on the GPU.
+    pub(crate) fn resolve(&mut self) -> Result<Radiance, Error> {
+        let image = Radiance::new(&self.gpu.device, self.size)?;
+        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let target = (self.frame.output_scale(1.0)?, &image);
+        self.tracer
+            .record_resolve(&self.gpu.queue, &mut encoder, &mut self.resources, target);
+        self.gpu.queue.submit([encoder.finish()]);
+        Ok(image)
+    }
+
+    /// Bytes by resource.
+    pub(crate) fn memory_by_resource(&self) -> Vec<(&'static str, u64)> {
+        vec![
+            ("BvhGeometry", self.geometry.memory_use()),
+            ("Emitters", self.emitters.memory_use()),
+            ("PathTracer", self.resources.memory_use()),
+        ]
+    }
+}

@@ -1,0 +1,271 @@
+// All that shines, sampled from a point: lights without geometry, emissive triangles, the environment. Reads emitters,
+// environment and params, which trace_paths.wgsl declares.
+
+// Twins of `reference::emitters::gpu`.
+const EMITTER_POINT: u32 = 0u;
+const EMITTER_SPOT: u32 = 1u;
+const EMITTER_DIRECTIONAL: u32 = 2u;
+const EMITTER_RECTANGLE: u32 = 3u;
+const EMITTER_TRIANGLE: u32 = 4u;
+const EMITTER_ENVIRONMENT: u32 = 5u;
+
+const EMITTER_PI: f32 = 3.14159265;
+
+struct Emitter {
+    // Where a point, spot or rectangle has its middle, a triangle its first corner
+    position: vec3f,
+    kind: u32,
+    // Axis of a spot, way of directional light, half an edge of a rectangle, an edge of a triangle
+    u: vec3f,
+    // Probability of picking this one or one before it
+    pick_until: f32,
+    v: vec3f,
+    // Probability of picking this one
+    pick: f32,
+    // Radiant intensity, irradiance on a perpendicular plane, or radiance
+    strength: vec3f,
+    // Radius of a point or spot, half angle of directional light, area of a rectangle or triangle
+    extent: f32,
+    // 1 - cos of a spot's half angles
+    inner: f32,
+    outer: f32,
+    material: u32,
+    tex_coords: array<vec2f, 3>,
+}
+
+// Light from one point of an emitter.
+struct EmitterSample {
+    // Radiance times the solid angle's share, or what stands for it where light comes from a single direction
+    radiance: vec3f,
+    // To be divided by: probability of the pick times density per solid angle
+    pdf: f32,
+    direction: vec3f,
+    is_infinite: bool,
+    // Where a shadow ray ends: before the emitter's own surface
+    position: vec3f,
+    // Whether a scattered ray could have met it
+    can_be_met: bool,
+}
+
+fn emitter_dark() -> EmitterSample {
+    return EmitterSample(vec3f(0.0), 1.0, vec3f(0.0, 0.0, 1.0), true, vec3f(0.0), false);
+}
+
+// The first emitter whose picks reach beyond u.
+fn emitter_pick(u: f32) -> u32 {
+    var low = 0u;
+    var high = params.emitter_count - 1u;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if emitters[middle].pick_until > u {
+            high = middle;
+        } else {
+            low = middle + 1u;
+        }
+    }
+    return low;
+}
+
+fn emitter_sample(p: vec3f, random: vec4f) -> EmitterSample {
+    let index = emitter_pick(random.w);
+    switch emitters[index].kind {
+        case EMITTER_POINT: { return emitter_sample_point(index, p, random.xy); }
+        case EMITTER_SPOT: { return emitter_sample_spot(index, p, random.xy); }
+        case EMITTER_DIRECTIONAL: { return emitter_sample_directional(index, random.xy); }
+        case EMITTER_RECTANGLE: { return emitter_sample_rectangle(index, p, random.xy); }
+        case EMITTER_TRIANGLE: { return emitter_sample_triangle(index, p, random.xy); }
+        default: { return environment_sample(index, random); }
+    }
+}
+
+// A point, or a sphere of radiance I / (pi R^2), from which every point outside sees a disc: uniform in its cone.
+fn emitter_sample_point(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
+    let e = emitters[index];
+    let way = e.position - p;
+    let squared = dot(way, way);
+    if squared == 0.0 {
+        return emitter_dark();
+    }
+    let distance = sqrt(squared);
+    let axis = way / distance;
+    if distance <= e.extent || e.extent == 0.0 {
+        return EmitterSample(e.strength / squared, e.pick, axis, false, e.position, false);
+    }
+    // 1 - cos of the cone's half angle, without cancellation.
+    let sine_squared = (e.extent / distance) * (e.extent / distance);
+    let one_minus_cos = sine_squared / (1.0 + sqrt(1.0 - sine_squared));
+    let local = emitter_cone(u, one_minus_cos);
+    let direction = normalize(sampling_frame(axis) * local);
+    let solid_angle = 2.0 * EMITTER_PI * one_minus_cos;
+    // Up to the sphere: the nearer crossing.
+    let along = distance * local.z;
+    let until = along - sqrt(max(0.0, e.extent * e.extent - squared * (1.0 - local.z * local.z)));
+    let radiance = e.strength / (EMITTER_PI * e.extent * e.extent);
+    return EmitterSample(radiance, e.pick / solid_angle, direction, false, p + until * direction, false);
+}
+
+// Uniform in the cone about +z of this 1 - cos.
+fn emitter_cone(u: vec2f, one_minus_cos: f32) -> vec3f {
+    let down = u.x * one_minus_cos;
+    let r = sqrt(max(0.0, down * (2.0 - down)));
+    let phi = 2.0 * EMITTER_PI * u.y;
+    return vec3f(r * cos(phi), r * sin(phi), 1.0 - down);
+}
+
+// A spot, or a disc of which every point shines like one.
+fn emitter_sample_spot(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
+    let e = emitters[index];
+    let on_disc = e.extent * sampling_disc(u);
+    let frame = sampling_frame(e.u);
+    let position = e.position + on_disc.x * frame[0] + on_disc.y * frame[1];
+    let way = position - p;
+    let squared = dot(way, way);
+    if squared == 0.0 {
+        return emitter_dark();
+    }
+    let direction = way / sqrt(squared);
+    let falloff = sampling_spot_falloff(sampling_one_minus_cos(-direction, e.u), e.inner, e.outer);
+    return EmitterSample(falloff * e.strength / squared, e.pick, direction, false, position, false);
+}
+
+// Parallel light, or a disc in the sky of radiance E / (pi sin^2): uniform in its cone.
+fn emitter_sample_directional(index: u32, u: vec2f) -> EmitterSample {
+    let e = emitters[index];
+    if e.extent == 0.0 {
+        return EmitterSample(e.strength, e.pick, -e.u, true, vec3f(0.0), false);
+    }
+    let half_sine = sin(0.5 * e.extent);
+    let one_minus_cos = 2.0 * half_sine * half_sine;
+    let sine = sin(e.extent);
+    let direction = normalize(sampling_frame(-e.u) * emitter_cone(u, one_minus_cos));
+    let solid_angle = 2.0 * EMITTER_PI * one_minus_cos;
+    return EmitterSample(
+        e.strength / (EMITTER_PI * sine * sine), e.pick / solid_angle, direction, true, vec3f(0.0), false,
+    );
+}
+
+// Density per solid angle with which a flat emitter's point is sampled.
+fn emitter_flat_pdf(pick: f32, area: f32, squared: f32, cosine: f32) -> f32 {
+    return pick * squared / (area * cosine);
+}
+
+fn emitter_sample_rectangle(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
+    let e = emitters[index];
+    let position = e.position + (2.0 * u.x - 1.0) * e.u + (2.0 * u.y - 1.0) * e.v;
+    let way = position - p;
+    let squared = dot(way, way);
+    let direction = way / sqrt(max(squared, 1e-30));
+    let cosine = -dot(normalize(cross(e.u, e.v)), direction);
+    if squared == 0.0 || cosine <= 0.0 {
+        return emitter_dark();
+    }
+    let pdf = emitter_flat_pdf(e.pick, e.extent, squared, cosine);
+    return EmitterSample(e.strength, pdf, direction, false, position, true);
+}
+
+// Density with which `emitter_sample` finds the point where a ray crosses a rectangle's front, per solid angle; 0 if it
+// does not cross it before `furthest`.
+fn emitter_rectangle_pdf(index: u32, origin: vec3f, direction: vec3f, furthest: f32) -> f32 {
+    let e = emitters[index];
+    let across = cross(e.u, e.v);
+    let cosine = -dot(normalize(across), direction);
+    if cosine <= 0.0 {
+        return 0.0;
+    }
+    let t = dot(across, e.position - origin) / dot(across, direction);
+    if t <= 0.0 || t >= furthest {
+        return 0.0;
+    }
+    // Coordinates along u and v, which need not be perpendicular (Cramer).
+    let at = origin + t * direction - e.position;
+    let scale = 1.0 / dot(across, across);
+    let a = dot(cross(at, e.v), across) * scale;
+    let b = dot(cross(e.u, at), across) * scale;
+    if max(abs(a), abs(b)) > 1.0 {
+        return 0.0;
+    }
+    return emitter_flat_pdf(e.pick, e.extent, t * t, cosine);
+}
+
+fn emitter_sample_triangle(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
+    let e = emitters[index];
+    // Uniform: the square folded along its diagonal.
+    let folded = select(u, 1.0 - u, u.x + u.y > 1.0);
+    let position = e.position + folded.x * e.u + folded.y * e.v;
+    let way = position - p;
+    let squared = dot(way, way);
+    let direction = way / sqrt(max(squared, 1e-30));
+    let normal = normalize(cross(e.u, e.v));
+    let cosine = -dot(normal, direction);
+    if squared == 0.0 || cosine <= 0.0 {
+        return emitter_dark();
+    }
+    let coords = e.tex_coords;
+    let tex_coord = coords[0] + folded.x * (coords[1] - coords[0]) + folded.y * (coords[2] - coords[0]);
+    let texel = bvh_texture(bvh_materials[e.material].emission_texture, tex_coord).rgb;
+    let pdf = emitter_flat_pdf(e.pick, e.extent, squared, cosine);
+    return EmitterSample(e.strength * texel, pdf, direction, false, bvh_offset(position, normal), true);
+}
+
+// Unit direction to coordinates of an equirectangular image: -z in its middle, +y at its top.
+fn environment_uv(direction: vec3f) -> vec2f {
+    let turn = (params.environment_rotation + atan2(direction.x, -direction.z)) / (2.0 * EMITTER_PI) + 0.5;
+    return vec2f(turn - floor(turn), acos(clamp(direction.y, -1.0, 1.0)) / EMITTER_PI);
+}
+
+fn environment_radiance(direction: vec3f) -> vec3f {
+    let texel = vec2u(environment_uv(direction) * vec2f(params.environment_size));
+    return textureLoad(environment, min(texel, params.environment_size - 1u), 0).rgb;
+}
+
+// Twin of `reference::emitters::luminance`: what the environment is sampled in proportion to.
+fn environment_luminance(radiance: vec3f) -> f32 {
+    return (radiance.x + radiance.y + radiance.z) / 3.0;
+}
+
+// Density per solid angle of directions of this radiance.
+fn environment_pdf(radiance: vec3f) -> f32 {
+    return environment_luminance(radiance) * params.environment_norm;
+}
+
+// A texel by its share of the light, then uniform within it.
+fn environment_sample(index: u32, random: vec4f) -> EmitterSample {
+    let size = params.environment_size;
+    var low = 0u;
+    var high = size.y - 1u;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if textureLoad(environment, vec2u(size.x, middle), 0).w > random.x {
+            high = middle;
+        } else {
+            low = middle + 1u;
+        }
+    }
+    let row = low;
+    low = 0u;
+    high = size.x - 1u;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if textureLoad(environment, vec2u(middle, row), 0).w > random.y {
+            high = middle;
+        } else {
+            low = middle + 1u;
+        }
+    }
+    let column = low;
+    let within = hash_pcg4d(vec4u(bitcast<u32>(random.x), bitcast<u32>(random.y), bitcast<u32>(random.z), column));
+    let u = vec2f(random.z, f32(within.x >> 8u) * 0x1p-24);
+    // Uniform in solid angle: uniform in cos(theta) between the texel's upper and lower edge.
+    let upper = cos(EMITTER_PI * f32(row) / f32(size.y));
+    let lower = cos(EMITTER_PI * f32(row + 1u) / f32(size.y));
+    let y = mix(upper, lower, u.y);
+    let phi = (((f32(column) + u.x) / f32(size.x)) - 0.5) * 2.0 * EMITTER_PI - params.environment_rotation;
+    let r = sqrt(max(0.0, 1.0 - y * y));
+    let direction = vec3f(r * sin(phi), y, -r * cos(phi));
+    let radiance = textureLoad(environment, vec2u(column, row), 0).rgb;
+    let pdf = emitters[index].pick * environment_pdf(radiance);
+    if pdf <= 0.0 {
+        return emitter_dark();
+    }
+    return EmitterSample(radiance, pdf, direction, true, vec3f(0.0), true);
+}

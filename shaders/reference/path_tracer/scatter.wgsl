@@ -1,0 +1,165 @@
+// How surfaces scatter: sampling a direction, and evaluating one with its density. Directions point away from the
+// surface; `outgoing` is the one towards the eye. Rough lobes are GGX with Smith shadowing of both directions apart
+// (Walter et al. 2007), their normals sampled as they are seen (Heitz 2018).
+
+const SCATTER_DIFFUSE: u32 = 0u;
+const SCATTER_MIRROR: u32 = 1u;
+const SCATTER_METAL: u32 = 2u;
+const SCATTER_GLASS: u32 = 3u;
+const SCATTER_ROUGH_GLASS: u32 = 4u;
+
+// Twins of the conventions of `scene::Material`.
+const SCATTER_IS_METAL: f32 = 0.5;
+const SCATTER_IS_TRANSMISSIVE: f32 = 0.5;
+const SCATTER_SMOOTH: f32 = 0.03;
+// Narrower lobes are as narrow as this.
+const SCATTER_LEAST_ALPHA: f32 = 0.001;
+const SCATTER_PI: f32 = 3.14159265;
+
+// A surface as a ray finds it.
+struct Scatterer {
+    kind: u32,
+    // The third axis is the shading normal, on the side that the ray came from
+    frame: mat3x3f,
+    // Reflectance, or the tint of what passes through
+    color: vec3f,
+    alpha: f32,
+    // Index of refraction of the far side over that of the near side
+    eta: f32,
+}
+
+struct Scattering {
+    direction: vec3f,
+    // BSDF times cosine over density
+    weight: vec3f,
+    // Per solid angle; 0 where the direction is the only one
+    pdf: f32,
+}
+
+fn scatter_at(surface: BvhSurface, direction: vec3f) -> Scatterer {
+    let m = surface.material;
+    let rough_metallic = bvh_texture(bvh_materials[m].metallic_roughness_texture, surface.tex_coord).gb;
+    let roughness = bvh_materials[m].roughness * rough_metallic.x;
+    let metallic = bvh_materials[m].metallic * rough_metallic.y;
+    let is_front = dot(surface.shading_normal, direction) < 0.0;
+    let normal = select(-surface.shading_normal, surface.shading_normal, is_front);
+    let is_smooth = roughness < SCATTER_SMOOTH;
+    var kind = SCATTER_DIFFUSE;
+    if bvh_materials[m].transmission > SCATTER_IS_TRANSMISSIVE {
+        kind = select(SCATTER_ROUGH_GLASS, SCATTER_GLASS, is_smooth);
+    } else if metallic > SCATTER_IS_METAL {
+        kind = select(SCATTER_METAL, SCATTER_MIRROR, is_smooth);
+    }
+    let index = bvh_materials[m].index_of_refraction;
+    let alpha = max(roughness * roughness, SCATTER_LEAST_ALPHA);
+    return Scatterer(
+        kind, sampling_frame(normal), bvh_base_color(surface), alpha, select(1.0 / index, index, is_front),
+    );
+}
+
+// Whether it scatters into single directions only, which no light can be sampled for.
+fn scatter_is_smooth(s: Scatterer) -> bool {
+    return s.kind == SCATTER_MIRROR || s.kind == SCATTER_GLASS;
+}
+
+fn scatter_sample(s: Scatterer, outgoing: vec3f, random: vec4f) -> Scattering {
+    let o = outgoing * s.frame;
+    var local: Scattering;
+    switch s.kind {
+        case SCATTER_MIRROR: { local = Scattering(vec3f(-o.xy, o.z), s.color, 0.0); }
+        case SCATTER_METAL: { local = scatter_sample_metal(s, o, random); }
+        case SCATTER_GLASS: { local = scatter_sample_glass(s, o, vec3f(0.0, 0.0, 1.0), random.z); }
+        case SCATTER_ROUGH_GLASS: { local = scatter_sample_rough_glass(s, o, random); }
+        default: {
+            let i = sampling_cosine(random.xy);
+            local = Scattering(i, s.color, i.z / SCATTER_PI);
+        }
+    }
+    local.direction = normalize(s.frame * local.direction);
+    return local;
+}
+
+// BSDF times cosine of the incoming direction, and the density with which `scatter_sample` finds it.
+fn scatter_evaluate(s: Scatterer, outgoing: vec3f, incoming: vec3f) -> vec4f {
+    let o = outgoing * s.frame;
+    let i = incoming * s.frame;
+    switch s.kind {
+        case SCATTER_DIFFUSE: {
+            let share = max(0.0, i.z) / SCATTER_PI;
+            return vec4f(share * s.color, share);
+        }
+        case SCATTER_METAL: {
+            if i.z <= 0.0 || o.z <= 0.0 {
+                return vec4f(0.0);
+            }
+            let h = normalize(o + i);
+            let seen = ggx_seen_density(o, h, s.alpha) / (4.0 * dot(o, h));
+            return vec4f(s.color * seen * ggx_lit_share(i, s.alpha), seen);
+        }
+        case SCATTER_ROUGH_GLASS: { return scatter_evaluate_rough_glass(s, o, i); }
+        default: { return vec4f(0.0); }
+    }
+}
+
+// With normals sampled as they are seen, what is left of the BSDF is the share of them that light reaches.
+fn scatter_sample_metal(s: Scatterer, o: vec3f, random: vec4f) -> Scattering {
+    let h = ggx_sample_seen(o, s.alpha, random.xy);
+    let i = reflect(-o, h);
+    if i.z <= 0.0 || o.z <= 0.0 {
+        return Scattering(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 1.0);
+    }
+    let pdf = ggx_seen_density(o, h, s.alpha) / (4.0 * max(dot(o, h), 1e-20));
+    return Scattering(i, s.color * ggx_lit_share(i, s.alpha), pdf);
+}
+
+// Reflects or refracts about a normal by chance. Radiance that enters a denser medium is squeezed into a narrower cone,
+// by the square of the ratio of indices.
+fn scatter_sample_glass(s: Scatterer, o: vec3f, h: vec3f, chance: f32) -> Scattering {
+    let cosine = dot(o, h);
+    let fresnel = fresnel_dielectric(cosine, s.eta);
+    if chance < fresnel.x {
+        return Scattering(reflect(-o, h), vec3f(1.0), 0.0);
+    }
+    let i = (cosine / s.eta - fresnel.y) * h - o / s.eta;
+    return Scattering(i, s.color / (s.eta * s.eta), 0.0);
+}
+
+fn scatter_sample_rough_glass(s: Scatterer, o: vec3f, random: vec4f) -> Scattering {
+    let h = ggx_sample_seen(o, s.alpha, random.xy);
+    var sample = scatter_sample_glass(s, o, h, random.z);
+    let transmits = sample.direction.z < 0.0;
+    // A direction on the wrong side of the surface is one that the neighbouring facets would block.
+    let is_blocked = transmits != (dot(sample.direction, h) < 0.0);
+    if is_blocked || o.z <= 0.0 || sample.direction.z == 0.0 {
+        return Scattering(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 1.0);
+    }
+    sample.weight *= ggx_lit_share(sample.direction, s.alpha);
+    sample.pdf = scatter_evaluate_rough_glass(s, o, sample.direction).w;
+    return sample;
+}
+
+// Walter et al. 2007, equations 20 and 21, for radiance.
+fn scatter_evaluate_rough_glass(s: Scatterer, o: vec3f, i: vec3f) -> vec4f {
+    if o.z <= 0.0 || i.z == 0.0 {
+        return vec4f(0.0);
+    }
+    let is_reflected = i.z > 0.0;
+    // The facet's normal, on the side of `o`.
+    var h = normalize(select(-(o + s.eta * i), o + i, is_reflected));
+    h = select(-h, h, h.z > 0.0);
+    let cosine_o = dot(o, h);
+    let cosine_i = dot(i, h);
+    if cosine_o <= 0.0 || (cosine_i > 0.0) != is_reflected {
+        return vec4f(0.0);
+    }
+    let fresnel = fresnel_dielectric(cosine_o, s.eta).x;
+    let seen = ggx_seen_density(o, h, s.alpha);
+    let lit = ggx_lit_share(i, s.alpha);
+    if is_reflected {
+        let pdf = fresnel * seen / (4.0 * cosine_o);
+        return vec4f(vec3f(pdf * lit), pdf);
+    }
+    let bent = cosine_o + s.eta * cosine_i;
+    let pdf = (1.0 - fresnel) * seen * s.eta * s.eta * abs(cosine_i) / max(bent * bent, 1e-20);
+    return vec4f(s.color * (pdf * lit / (s.eta * s.eta)), pdf);
+}
