@@ -306,6 +306,112 @@ fn errors_near_an_edge_are_told_from_the_others() -> Result<(), Error> {
     Ok(())
 }
 
+#[test]
+fn a_downsampled_truth_is_the_mean_of_its_pixels() -> Result<(), Error> {
+    let image = Noise(6).image(12, 8);
+    let mean = |column: u32, row: u32, channel: usize| {
+        let sum: f64 = (0..16)
+            .map(|i| (4 * row + i / 4) * 12 + 4 * column + i % 4)
+            .map(|pixel| f64::from(image.rgb[pixel as usize][channel]))
+            .sum();
+        (sum / 16.0) as f32
+    };
+    let coarse = Truth::new(image.clone()).downsampled(4)?;
+    assert_eq!((coarse.image.width, coarse.image.height), (3, 2));
+    for (pixel, rgb) in (0..).zip(&coarse.image.rgb) {
+        assert_eq!(*rgb, [0, 1, 2].map(|channel| mean(pixel % 3, pixel / 3, channel)));
+    }
+    assert_eq!(coarse.standard_error, None);
+    assert_eq!(coarse.geometry, None);
+    Ok(())
+}
+
+#[test]
+fn the_noise_of_a_downsampled_truth_is_as_large_as_it_says() -> Result<(), Error> {
+    let (exact, amplitude, mut noise) = (uniform(256, 256, 1.0), 0.125_f32, Noise(8));
+    let mut noisy = exact.clone();
+    noisy
+        .rgb
+        .iter_mut()
+        .flatten()
+        .for_each(|radiance| *radiance += amplitude * noise.next());
+    let deviation = amplitude / 3.0_f32.sqrt();
+    let truth = Truth {
+        standard_error: Some(vec![[deviation; 3]; noisy.rgb.len()]),
+        ..Truth::new(noisy)
+    };
+    let coarse = truth.downsampled(4)?;
+    for error in coarse.standard_error.iter().flatten().flatten() {
+        assert_relative_eq!(*error, deviation / 4.0, max_relative = 1e-6);
+    }
+    // A sum of 16 is nearly normal: (x − r)² − σ² has the variance 2 σ⁴.
+    let comparison = compare(&uniform(64, 64, 1.0), &coarse)?;
+    let sigma = (2.0 / (3.0 * comparison.pixels as f64)).sqrt() * comparison.truth_noise;
+    assert!(
+        comparison.relmse.abs() < 3.0 * sigma,
+        "relmse {}, sigma {sigma}",
+        comparison.relmse
+    );
+    Ok(())
+}
+
+#[test]
+fn one_bad_pixel_masks_the_larger_pixel_that_holds_it() -> Result<(), Error> {
+    let mut truth = Truth::new(uniform(6, 4, 1.0));
+    truth.valid[6 + 1] = false;
+    truth.image.rgb[6 + 1] = [f32::NAN; 3];
+    truth.mixed[2 * 6 + 4] = true;
+    let coarse = truth.downsampled(2)?;
+    assert_eq!(coarse.valid, [false, true, true, true, true, true]);
+    assert_eq!(coarse.mixed, [false, false, false, false, false, true]);
+    Ok(())
+}
+
+#[test]
+fn a_larger_pixel_that_an_edge_crosses_is_mixed() -> Result<(), Error> {
+    // The edge runs between columns 2 and 3, so that no pixel of the original is mixed.
+    let up_to = |column: usize, first: f32, then: f32| (0..32).map(move |i| if i % 8 < column { first } else { then });
+    let truth = Truth {
+        geometry: Some(Geometry {
+            depth: up_to(3, 1.0, 2.0).collect(),
+            normal: vec![[0.0, 0.0, 1.0]; 32],
+        }),
+        ..Truth::new(uniform(8, 4, 1.0))
+    };
+    let coarse = truth.downsampled(4)?;
+    assert_eq!(coarse.mixed, [true, false]);
+    let depth = coarse.geometry.expect("the original has one").depth;
+    assert_eq!(
+        depth,
+        [1.0, 2.0],
+        "of the pixel at the centre, not a mean of both surfaces"
+    );
+    // Between two larger pixels it harms neither.
+    let coarse = Truth {
+        geometry: Some(Geometry {
+            depth: up_to(4, 1.0, 2.0).collect(),
+            normal: vec![[0.0, 0.0, 1.0]; 32],
+        }),
+        ..truth
+    }
+    .downsampled(4)?;
+    assert_eq!(coarse.mixed, [false, false]);
+    Ok(())
+}
+
+#[test]
+fn a_truth_is_reduced_by_what_divides_its_size_alone() -> Result<(), Error> {
+    let truth = Truth::new(Noise(9).image(12, 8));
+    assert_eq!(truth.downsampled(1)?, truth);
+    for factor in [0, 3, 5, 8, 24, u32::MAX] {
+        assert!(
+            matches!(truth.downsampled(factor), Err(Error::InvalidReference { .. })),
+            "{factor}"
+        );
+    }
+    Ok(())
+}
+
 /// A file in the folder for temporary files, removed at the end.
 struct Temporary(PathBuf);
 

@@ -112,6 +112,74 @@ impl Truth {
         self.valid[pixel] && !self.mixed[pixel]
     }
 
+    /// The same reference at 1/`factor` of the width and height, for images that are cheaper to render.
+    ///
+    /// Radiance is the mean over `factor` × `factor` pixels, as a box filter of the larger pixel gives it. Its standard
+    /// error is that of a mean of independent pixels, √(Σσ²) / `factor`². A pixel is valid if all of its parts are, and
+    /// mixed if one of them is or if two neighbours among them lie on different surfaces, where the geometry is known.
+    /// Depth and normal are those of the part at the pixel's centre, for an even factor the one to its lower right, not
+    /// means, which would lie between two surfaces. The step in depth from pixel to pixel grows with the factor, so that
+    /// more of what is seen at a grazing angle counts as near an edge.
+    ///
+    /// ```
+    /// use lightfall::reference::metrics::{Image, Truth};
+    ///
+    /// let image = Image { width: 2, height: 2, rgb: vec![[1.0; 3], [2.0; 3], [3.0; 3], [6.0; 3]] };
+    /// let truth = Truth { standard_error: Some(vec![[0.2; 3]; 4]), ..Truth::new(image) };
+    /// let coarse = truth.downsampled(2)?;
+    /// assert_eq!(coarse.image, Image { width: 1, height: 1, rgb: vec![[3.0; 3]] });
+    /// assert_eq!(coarse.standard_error, Some(vec![[0.1; 3]]));
+    /// # Ok::<(), lightfall::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Truth::validate`]; [`Error::InvalidReference`] if `factor` does not divide width and height.
+    pub fn downsampled(&self, factor: u32) -> Result<Self, Error> {
+        self.validate()?;
+        let Image { width, height, .. } = self.image;
+        if factor == 0 || width % factor != 0 || height % factor != 0 {
+            return Err(invalid(format!(
+                "of {width} × {height} pixels cannot be reduced {factor} times"
+            )));
+        }
+        let blocks = Blocks {
+            columns: (width / factor) as usize,
+            rows: (height / factor) as usize,
+            factor: factor as usize,
+        };
+        let area = f64::from(factor) * f64::from(factor);
+        let channels = |block: usize, value: &dyn Fn(usize) -> [f64; 3]| {
+            let sum = blocks
+                .pixels(block)
+                .map(value)
+                .fold([0.0; 3], |sum, x| [0, 1, 2].map(|c| sum[c] + x[c]));
+            sum.map(|sum| sum / area)
+        };
+        let single = |value: f64| value as f32;
+        let is_mixed = |block: usize| {
+            let crosses_edge = |geometry| blocks.neighbours(block).any(|(a, b)| is_edge(geometry, a, b));
+            blocks.pixels(block).any(|pixel| self.mixed[pixel]) || self.geometry.as_ref().is_some_and(crosses_edge)
+        };
+        Ok(Self {
+            image: Image {
+                width: width / factor,
+                height: height / factor,
+                rgb: blocks.all(|block| channels(block, &|pixel| self.image.rgb[pixel].map(f64::from)).map(single)),
+            },
+            standard_error: self.standard_error.as_ref().map(|_| {
+                blocks.all(|block| {
+                    channels(block, &|pixel| self.variance(pixel)).map(|mean| single((mean / area).sqrt()))
+                })
+            }),
+            valid: blocks.all(|block| blocks.pixels(block).all(|pixel| self.valid[pixel])),
+            mixed: blocks.all(is_mixed),
+            geometry: self.geometry.as_ref().map(|geometry| Geometry {
+                depth: blocks.all(|block| geometry.depth[blocks.center(block)]),
+                normal: blocks.all(|block| geometry.normal[blocks.center(block)]),
+            }),
+        })
+    }
+
     /// Checks that all lists fit the image and that what is compared with is finite.
     ///
     /// # Errors
@@ -150,6 +218,41 @@ impl Truth {
     fn variance(&self, pixel: usize) -> [f64; 3] {
         let error = self.standard_error.as_ref().map_or([0.0; 3], |error| error[pixel]);
         error.map(|error| f64::from(error) * f64::from(error))
+    }
+}
+
+/// An image cut into squares of `factor` × `factor` pixels.
+struct Blocks {
+    columns: usize,
+    rows: usize,
+    factor: usize,
+}
+
+impl Blocks {
+    fn all<T>(&self, value: impl Fn(usize) -> T) -> Vec<T> {
+        (0..self.columns * self.rows).map(value).collect()
+    }
+
+    /// Index of the pixel at this column and row of a block.
+    fn pixel(&self, block: usize, column: usize, row: usize) -> usize {
+        let (left, top) = (block % self.columns * self.factor, block / self.columns * self.factor);
+        (top + row) * self.columns * self.factor + left + column
+    }
+
+    fn pixels(&self, block: usize) -> impl Iterator<Item = usize> {
+        (0..self.factor * self.factor).map(move |i| self.pixel(block, i % self.factor, i / self.factor))
+    }
+
+    fn center(&self, block: usize) -> usize {
+        self.pixel(block, self.factor / 2, self.factor / 2)
+    }
+
+    /// All pairs of pixels of a block that share a side.
+    fn neighbours(&self, block: usize) -> impl Iterator<Item = (usize, usize)> {
+        neighbours(self.factor * self.factor, self.factor).map(move |(a, b)| {
+            let pixel = |i: usize| self.pixel(block, i % self.factor, i / self.factor);
+            (pixel(a), pixel(b))
+        })
     }
 }
 
