@@ -11,13 +11,12 @@ mod common;
 
 use clap::{Parser, ValueEnum};
 use common::adapter::{Gpu, Wishes};
+use common::clock::Clock;
 use common::offline::{Component, Offline};
-use common::{arguments, exr_file, gltf_scene, picture};
-use lightfall::Timestamps;
+use common::{arguments, exr_file, gltf_scene, picture, progress};
 use lightfall::frame::{GiRenderer, Plan, Settings};
 use lightfall::scene::{Scene, SceneSummary, samples};
 use serde_json::{Value, json};
-use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -153,18 +152,17 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     let mut offline =
         Offline::new(&gpu, scene, &settings, arguments.camera, size, component).map_err(|e| e.to_string())?;
     let setup_ms = setup.elapsed().as_secs_f64() * 1e3;
-    let timestamps = Timestamps::new(&gpu.device).ok();
-    let mut clock = Clock::new(setup_ms, timestamps.is_some());
-    let bar = progress(times.len() as u64 * u64::from(settings.frames));
+    let mut clock = Clock::new(&gpu);
+    let bar = progress::bar(times.len() as u64 * u64::from(settings.frames));
     for (number, &time) in times.iter().enumerate() {
         if number > 0 {
             offline.set_scene(load(arguments, time)?).map_err(|e| e.to_string())?;
         }
         for _ in 0..settings.frames {
-            clock.frame(&gpu, &mut offline, timestamps.as_ref())?;
+            clock.frame(&gpu, &mut offline)?;
             bar.inc(1);
         }
-        check_device(&gpu)?;
+        gpu.check()?;
         if let Some(out) = &arguments.out {
             let path = if arguments.animate.is_some() {
                 numbered(out, number)
@@ -176,29 +174,15 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     }
     bar.finish_and_clear();
     if arguments.stats.is_some() {
-        // At least a whole round of the selection of places for environment maps.
-        while clock.frames_ms.len() < settings.selector.interval.max(3) as usize {
-            clock.frame(&gpu, &mut offline, timestamps.as_ref())?;
-        }
+        clock.settle(&gpu, &mut offline)?;
     }
-    check_device(&gpu)?;
+    gpu.check()?;
     if let Some(path) = &arguments.stats {
-        let report = report(&gpu, &offline, &settings, &clock)?;
+        let report = report(&gpu, &offline, &settings, (setup_ms, &clock))?;
         let text = serde_json::to_string_pretty(&report).map_err(|e| e.to_string())?;
         exr_file::replace_file(path, text.as_bytes())?;
     }
     Ok(())
-}
-
-/// Nothing is written of what the device did not render as it was told.
-fn check_device(gpu: &Gpu) -> Result<(), String> {
-    match gpu.take_errors().first() {
-        Some(error) => Err(format!(
-            "the device reported: {}",
-            error.lines().next().unwrap_or_default()
-        )),
-        None => Ok(()),
-    }
 }
 
 /// Refuses what a later version will do, by name; returns the component.
@@ -314,70 +298,12 @@ fn write(gpu: &Gpu, offline: &Offline<'_>, path: &Path, exposure: Option<f32>) -
     picture::write_png((&gpu.device, &gpu.queue), path, offline.radiance(), exposure)
 }
 
-/// A bar on a terminal, nothing in a pipe.
-fn progress(length: u64) -> indicatif::ProgressBar {
-    if std::io::stderr().is_terminal() && length > 1 {
-        indicatif::ProgressBar::new(length)
-    } else {
-        indicatif::ProgressBar::hidden()
-    }
-}
-
-/// Times of frames and stages. A stage that runs in some frames only counts for its share.
-struct Clock {
-    setup_ms: f64,
-    on_gpu: bool,
-    /// Steady-state frames only: the first one also compiles and allocates.
-    frames_ms: Vec<f64>,
-    stages: Vec<(&'static str, Vec<f64>)>,
-    seen_first: bool,
-}
-
-impl Clock {
-    fn new(setup_ms: f64, on_gpu: bool) -> Self {
-        Self {
-            setup_ms,
-            on_gpu,
-            frames_ms: Vec::new(),
-            stages: Vec::new(),
-            seen_first: false,
-        }
-    }
-
-    fn frame(&mut self, gpu: &Gpu, offline: &mut Offline<'_>, timestamps: Option<&Timestamps>) -> Result<(), String> {
-        let start = Instant::now();
-        offline.render_frame(timestamps).map_err(|e| e.to_string())?;
-        let wall_ms = start.elapsed().as_secs_f64() * 1e3;
-        let stages = match timestamps {
-            Some(t) => t.take_blocking(&gpu.device, &gpu.queue).map_err(|e| e.to_string())?,
-            None => Vec::new(),
-        };
-        if !self.seen_first {
-            self.seen_first = true;
-            return Ok(());
-        }
-        self.frames_ms.push(if self.on_gpu {
-            stages.iter().map(|s| s.1).sum()
-        } else {
-            wall_ms
-        });
-        for (label, ms) in stages {
-            match self.stages.iter_mut().find(|(l, _)| *l == label) {
-                Some((_, all)) => all.push(ms),
-                None => self.stages.push((label, vec![ms])),
-            }
-        }
-        Ok(())
-    }
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
-}
-
-fn report(gpu: &Gpu, offline: &Offline<'_>, settings: &Settings, clock: &Clock) -> Result<Value, String> {
+fn report(
+    gpu: &Gpu,
+    offline: &Offline<'_>,
+    settings: &Settings,
+    (setup_ms, clock): (f64, &Clock),
+) -> Result<Value, String> {
     let flux_scale = offline.renderer.frame().map_or(1.0, |f| f.flux_scale());
     let watts = |flux: [f32; 3]| flux.map(|v| f64::from(v) * flux_scale);
     let hops = offline.statistics().map_err(|e| e.to_string())?;
@@ -392,14 +318,10 @@ fn report(gpu: &Gpu, offline: &Offline<'_>, settings: &Settings, clock: &Clock) 
         .collect();
     let by_resource = offline.memory_by_resource();
     let plan = offline.renderer.plan().map(|p| p.stages.clone()).unwrap_or_default();
-    let spread = |f: fn(f64, f64) -> f64| clock.frames_ms.iter().copied().reduce(f);
+    let [median, min, max] = clock.frame_ms();
     let stages: Vec<Value> = clock
-        .stages
-        .iter()
-        .map(|(name, all)| {
-            let share = all.len() as f64 / clock.frames_ms.len().max(1) as f64;
-            json!({"name": name.trim_start_matches("lightfall::"), "ms": median(all) * share})
-        })
+        .stages_ms()
+        .map(|(name, ms)| json!({"name": name.trim_start_matches("lightfall::"), "ms": ms}))
         .collect();
     Ok(json!({
         "adapter": {
@@ -410,9 +332,9 @@ fn report(gpu: &Gpu, offline: &Offline<'_>, settings: &Settings, clock: &Clock) 
         "frames": settings.frames,
         "settings": settings.entries().into_iter().collect::<std::collections::BTreeMap<_, _>>(),
         "time": {
-            "clock": if clock.on_gpu { "gpu" } else { "wall" },
-            "setup_ms": clock.setup_ms,
-            "frame_ms": {"median": median(&clock.frames_ms), "min": spread(f64::min), "max": spread(f64::max)},
+            "clock": clock.kind(),
+            "setup_ms": setup_ms,
+            "frame_ms": {"median": median, "min": min, "max": max},
             "stages": stages,
         },
         "photons": {

@@ -63,6 +63,17 @@ impl Gpu {
     pub(crate) fn take_errors(&self) -> Vec<String> {
         std::mem::take(&mut self.errors.lock().expect("no holder panics"))
     }
+
+    /// Whether the device rendered as it was told; if not, nothing of it should be shown or written.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        match self.take_errors().first() {
+            Some(error) => Err(format!(
+                "the device reported: {}",
+                error.lines().next().unwrap_or_default()
+            )),
+            None => Ok(()),
+        }
+    }
 }
 
 /// All adapters, and whether each runs core WebGPU. GL, which does not, is asked only when there is nothing else: its

@@ -3,11 +3,13 @@
 
 pub(crate) mod adapter;
 pub(crate) mod arguments;
+pub(crate) mod clock;
 pub(crate) mod exr_file;
 pub(crate) mod gltf_scene;
 pub(crate) mod offline;
 pub(crate) mod picture;
 #[cfg(all(feature = "bvh", feature = "reference"))]
 pub(crate) mod reference;
+pub(crate) mod progress;
 #[cfg(feature = "reference")]
 pub(crate) mod truth_file;

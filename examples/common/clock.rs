@@ -1,0 +1,90 @@
+//! Times of frames and stages.
+
+use super::adapter::Gpu;
+use super::offline::Offline;
+use lightfall::Timestamps;
+
+/// Renders frames and keeps their times: of GPU timestamps where the device has them, else on the wall. A stage that runs
+/// in some frames only counts for its share.
+pub(crate) struct Clock {
+    timestamps: Option<Timestamps>,
+    /// Steady-state frames only: the first one also compiles and allocates.
+    frames_ms: Vec<f64>,
+    stages: Vec<(&'static str, Vec<f64>)>,
+    seen_first: bool,
+}
+
+impl Clock {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
+        Self {
+            timestamps: Timestamps::new(&gpu.device).ok(),
+            frames_ms: Vec::new(),
+            stages: Vec::new(),
+            seen_first: false,
+        }
+    }
+
+    /// What the times are taken with: "gpu" or "wall".
+    pub(crate) fn kind(&self) -> &'static str {
+        if self.timestamps.is_some() { "gpu" } else { "wall" }
+    }
+
+    /// Renders the next frame.
+    pub(crate) fn frame(&mut self, gpu: &Gpu, offline: &mut Offline<'_>) -> Result<(), String> {
+        let start = std::time::Instant::now();
+        offline
+            .render_frame(self.timestamps.as_ref())
+            .map_err(|e| e.to_string())?;
+        let wall_ms = start.elapsed().as_secs_f64() * 1e3;
+        let stages = match &self.timestamps {
+            Some(t) => t.take_blocking(&gpu.device, &gpu.queue).map_err(|e| e.to_string())?,
+            None => Vec::new(),
+        };
+        if !self.seen_first {
+            self.seen_first = true;
+            return Ok(());
+        }
+        self.frames_ms.push(if self.timestamps.is_some() {
+            stages.iter().map(|s| s.1).sum()
+        } else {
+            wall_ms
+        });
+        for (label, ms) in stages {
+            match self.stages.iter_mut().find(|(l, _)| *l == label) {
+                Some((_, all)) => all.push(ms),
+                None => self.stages.push((label, vec![ms])),
+            }
+        }
+        Ok(())
+    }
+
+    /// Renders further frames until there are enough for a median: at least a whole round of the selection of places for
+    /// environment maps.
+    pub(crate) fn settle(&mut self, gpu: &Gpu, offline: &mut Offline<'_>) -> Result<(), String> {
+        let enough = offline.renderer.settings().selector.interval.max(3) as usize;
+        while self.frames_ms.len() < enough {
+            self.frame(gpu, offline)?;
+        }
+        Ok(())
+    }
+
+    /// Median, shortest and longest frame in the steady state, milliseconds.
+    pub(crate) fn frame_ms(&self) -> [f64; 3] {
+        let extreme = |f: fn(f64, f64) -> f64| self.frames_ms.iter().copied().reduce(f).unwrap_or(0.0);
+        [median(&self.frames_ms), extreme(f64::min), extreme(f64::max)]
+    }
+
+    /// Milliseconds of each stage in a frame, in order of first use.
+    pub(crate) fn stages_ms(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        self.stages.iter().map(|(name, all)| {
+            let share = all.len() as f64 / self.frames_ms.len().max(1) as f64;
+            (*name, median(all) * share)
+        })
+    }
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
