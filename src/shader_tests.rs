@@ -4,7 +4,7 @@
 use crate::gpu::Slot;
 use crate::pass::{
     accumulator, composite, direct_light, env_map_selector, image_space_tracer, nearest_occluder, photon_emitter,
-    photon_splatter, soft_shadow, tone_map, trace_statistics, upsampler,
+    photon_splatter, photon_walk, soft_shadow, tone_map, trace_statistics, upsampler,
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
@@ -233,7 +233,10 @@ fn twins() -> Vec<Twin> {
             photon_count, light_count, sample_offset, shadow_map_size, row,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "Params", image_space_tracer::gpu::Params {
-            photon_count, bounces, roulette_from, sample_offset, map_count, map_size, iterations, epsilon, row,
+            map_count, map_size, iterations, epsilon,
+        }),
+        twin!(wgsl::IMAGE_SPACE_TRACER, "WalkParams", photon_walk::gpu::WalkParams {
+            photon_count, first_hop, last_hop, roulette_from, sample_offset, row,
         }),
         #[cfg(feature = "bvh")]
         twin!(wgsl::BVH_TRACER, "Params", bvh_tracer::gpu::Params { ray_count, row }),
@@ -395,7 +398,7 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
     match module {
         "MeshGeometry" => vec![&mesh_geometry::SCENE_SLOTS, &mesh_geometry::MATERIAL_SLOTS],
         "PhotonEmitter" => vec![&photon_emitter::SLOTS],
-        "ImageSpaceTracer" => vec![&image_space_tracer::SLOTS],
+        "ImageSpaceTracer" => vec![&photon_walk::SLOTS, &image_space_tracer::SLOTS],
         #[cfg(feature = "bvh")]
         "BvhTracer" => vec![&bvh_tracer::SLOTS, &bvh_geometry::BVH_SLOTS],
         "PhotonSplatter tiled" => vec![&photon_splatter::TILED_SLOTS],

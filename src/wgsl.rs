@@ -43,11 +43,13 @@ pub(crate) const PHOTON_EMITTER: &str = compose![
 ];
 
 pub(crate) const IMAGE_SPACE_TRACER: &str = compose![
-    "pass/image_space_tracer/walk_photons.wgsl",
     "pass/image_space_tracer/trace_ray.wgsl",
     "pass/image_space_tracer/false_position.wgsl",
     "pass/image_space_tracer/ordered_march.wgsl",
+    "pass/photon_walk/walk_photons.wgsl",
+    "pass/photon_walk/params.wgsl",
     "common/env_map.wgsl",
+    "common/hit.wgsl",
     "common/photon.wgsl",
     "common/surface_texel.wgsl",
     "common/octahedral.wgsl",

@@ -7,6 +7,7 @@
 //! records ([`TraceStatistics`](super::TraceStatistics) adds them up).
 
 use super::dispatch_64;
+use super::photon_walk::{PhotonWalk, PhotonWalkInputs, PhotonWalkResources};
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::{EnvMaps, Photons};
 use crate::{Error, Timestamps, wgsl};
@@ -14,24 +15,19 @@ use crate::{Error, Timestamps, wgsl};
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
-    /// Twin of `Params` in `shaders/pass/image_space_tracer/walk_photons.wgsl`.
+    /// Twin of `Params` in `shaders/pass/image_space_tracer/trace_ray.wgsl`.
     #[derive(Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
     pub(crate) struct Params {
-        pub(crate) photon_count: u32,
-        pub(crate) bounces: u32,
-        pub(crate) roulette_from: u32,
-        pub(crate) sample_offset: u32,
         pub(crate) map_count: u32,
         pub(crate) map_size: u32,
         pub(crate) iterations: u32,
         pub(crate) epsilon: f32,
-        pub(crate) row: u32,
     }
 }
 
-/// Bindings of `shaders/pass/image_space_tracer/walk_photons.wgsl`, in order.
-pub(crate) const SLOTS: [Slot; 4] = [Slot::Uniform, Slot::UintArray, Slot::Storage, Slot::StorageMut];
+/// Bindings of group 1: `shaders/pass/image_space_tracer/trace_ray.wgsl`, in order.
+pub(crate) const SLOTS: [Slot; 3] = [Slot::Uniform, Slot::UintArray, Slot::Storage];
 
 /// How a ray is searched for in the maps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -77,6 +73,7 @@ const PAPER_EPSILON: f32 = 0.001;
 #[derive(Debug)]
 pub struct ImageSpaceTracer {
     device: wgpu::Device,
+    walk: PhotonWalk,
     layout: wgpu::BindGroupLayout,
     /// By [`TraceMethod`].
     walks: [wgpu::ComputePipeline; 3],
@@ -85,6 +82,7 @@ pub struct ImageSpaceTracer {
 /// Uniforms and bind groups.
 #[derive(Debug)]
 pub struct ImageSpaceTracerResources {
+    walk: PhotonWalkResources,
     params: wgpu::Buffer,
     groups: BindGroupCache,
 }
@@ -109,27 +107,29 @@ pub struct ImageSpaceTracerInputs<'a> {
 impl ImageSpaceTracer {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
+        let walk = PhotonWalk::new(device, "lightfall::ImageSpaceTracer::walk");
         let layout = device::layout(
             device,
             "lightfall::ImageSpaceTracer",
             wgpu::ShaderStages::COMPUTE,
             &SLOTS,
         );
-        let walk = |method: TraceMethod| {
+        let by_method = |method: TraceMethod| {
             device::compute_pipeline(
                 device,
                 &ComputeSpec {
                     label: "lightfall::ImageSpaceTracer::walk",
                     source: wgsl::IMAGE_SPACE_TRACER,
                     entry_point: "walk_photons",
-                    layouts: &[&layout],
+                    layouts: &[&walk.layout, &layout],
                     constants: &[("method", f64::from(method as u32))],
                 },
             )
         };
-        let walks = [TraceMethod::Paper, TraceMethod::Plane, TraceMethod::OrderedMarch].map(walk);
+        let walks = [TraceMethod::Paper, TraceMethod::Plane, TraceMethod::OrderedMarch].map(by_method);
         Self {
             device: device.clone(),
+            walk,
             layout,
             walks,
         }
@@ -142,18 +142,19 @@ impl ImageSpaceTracer {
         resources: &mut ImageSpaceTracerResources,
         inputs: &ImageSpaceTracerInputs<'_>,
     ) {
-        let (groups, row) = dispatch_64(inputs.photons.count());
         let settings = inputs.settings;
-        let params = gpu::Params {
-            photon_count: inputs.photons.count(),
-            bounces: inputs.photons.bounces(),
-            roulette_from: settings.roulette_from,
+        let walk = PhotonWalkInputs {
+            queue: inputs.queue,
+            photons: inputs.photons,
             sample_offset: inputs.sample_offset,
+            roulette_from: settings.roulette_from,
+        };
+        let walk = self.walk.group(&mut resources.walk, &walk);
+        let params = gpu::Params {
             map_count: inputs.env_maps.centers().len() as u32,
             map_size: inputs.env_maps.size(),
             iterations: settings.iterations.clamp(1, 32),
             epsilon: PAPER_EPSILON,
-            row,
         };
         inputs
             .queue
@@ -162,13 +163,14 @@ impl ImageSpaceTracer {
             (&resources.params).into(),
             inputs.env_maps.view().into(),
             inputs.env_maps.centers_buffer().into(),
-            inputs.photons.buffer().into(),
         ];
         let label = "lightfall::ImageSpaceTracer";
-        let group = resources.groups.get(&self.device, label, &self.layout, &bound);
+        let maps = resources.groups.get(&self.device, label, &self.layout, &bound);
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.walks[settings.method as usize]);
-        pass.set_bind_group(0, &group, &[]);
+        pass.set_bind_group(0, &walk, &[]);
+        pass.set_bind_group(1, &maps, &[]);
+        let (groups, _) = dispatch_64(inputs.photons.count());
         pass.dispatch_workgroups(groups[0], groups[1], 1);
     }
 }
@@ -180,6 +182,7 @@ impl ImageSpaceTracerResources {
     /// [`Error::LimitExceeded`] if the device grants next to nothing.
     pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
         Ok(Self {
+            walk: PhotonWalkResources::new(device, "lightfall::ImageSpaceTracer::walk")?,
             params: device::uniform_buffer::<gpu::Params>(device, "lightfall::ImageSpaceTracer::params")?,
             groups: BindGroupCache::default(),
         })
@@ -187,6 +190,6 @@ impl ImageSpaceTracerResources {
 
     /// Bytes allocated.
     pub fn memory_use(&self) -> u64 {
-        self.params.size()
+        self.walk.memory_use() + self.params.size()
     }
 }

@@ -18,6 +18,7 @@ pub(crate) mod image_space_tracer;
 pub(crate) mod nearest_occluder;
 pub(crate) mod photon_emitter;
 pub(crate) mod photon_splatter;
+pub(crate) mod photon_walk;
 mod shadow_map_capture;
 pub(crate) mod soft_shadow;
 pub(crate) mod tone_map;

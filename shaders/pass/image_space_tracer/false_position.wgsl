@@ -35,9 +35,9 @@ fn false_position_accept_angle(texel: EnvMapTexel, x: vec3f, r: vec3f) -> Hit {
     let error = 1.0 - dot(offset, r) / max(distance, 1e-9);
     // A point's own texel lies on every ray from it: nearer than this is the origin itself.
     if error > params.epsilon || distance < 4.0 * TRACE_NEAREST {
-        return trace_nothing(TRACE_LOST);
+        return hit_nothing(HIT_LOST);
     }
-    return Hit(TRACE_HIT, distance, stored, texel.surface.normal, texel.surface.reflectance);
+    return Hit(HIT_SURFACE, distance, stored, texel.surface.normal, texel.surface.reflectance);
 }
 
 // What one map says of the ray.
@@ -45,7 +45,7 @@ fn false_position_map(map: u32, x: vec3f, r: vec3f) -> Hit {
     let t = false_position_search(map, x, r);
     let texel = env_map_texel(map, x + t * r, params.map_size);
     if texel.surface.distance <= 0.0 {
-        return trace_nothing(TRACE_ESCAPED);
+        return hit_nothing(HIT_ESCAPED);
     }
     if method == METHOD_PAPER {
         return false_position_accept_angle(texel, x, r);
@@ -56,7 +56,7 @@ fn false_position_map(map: u32, x: vec3f, r: vec3f) -> Hit {
 // The nearest hit that any map accepts. With the plane test only maps that see the ray's origin are asked, if there are
 // any: another map's surfaces may lie behind walls that it does not know.
 fn false_position_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
-    var best = trace_nothing(TRACE_LOST);
+    var best = hit_nothing(HIT_LOST);
     var asked = 0u;
     for (var round = 0u; round < 2u; round++) {
         for (var map = 0u; map < params.map_count; map++) {
@@ -70,11 +70,11 @@ fn false_position_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
             }
             asked++;
             let hit = false_position_map(map, x, r);
-            if hit.kind == TRACE_HIT && (best.kind != TRACE_HIT || hit.distance < best.distance) {
+            if hit.kind == HIT_SURFACE && (best.kind != HIT_SURFACE || hit.distance < best.distance) {
                 best = hit;
                 best.position += center;
-            } else if hit.kind == TRACE_ESCAPED && best.kind == TRACE_LOST {
-                best.kind = TRACE_ESCAPED;
+            } else if hit.kind == HIT_ESCAPED && best.kind == HIT_LOST {
+                best.kind = HIT_ESCAPED;
             }
         }
         if asked > 0u {

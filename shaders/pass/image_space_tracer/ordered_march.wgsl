@@ -14,10 +14,10 @@ const MARCH_REFINEMENTS: u32 = 5u;
 const MARCH_CLOSEST: f32 = 0x1p-14;
 
 struct March {
-    // TRACE_HIT, TRACE_ESCAPED: certain. TRACE_LOST: known to be free up to `free`, unknown beyond.
+    // HIT_SURFACE, HIT_ESCAPED: certain. HIT_LOST: known to be free up to `free`, unknown beyond.
     kind: u32,
     free: f32,
-    // The first crossing found, certain or tentative; TRACE_LOST if there is none
+    // The first crossing found, certain or tentative; HIT_LOST if there is none
     hit: Hit,
 }
 
@@ -38,7 +38,7 @@ fn march_refine(map: u32, x: vec3f, r: vec3f, front: vec2f, behind: vec2f) -> Hi
     }
     var texel = env_map_texel(map, x + over.x * r, params.map_size);
     let hit = trace_accept_plane(texel, x, r);
-    if hit.kind == TRACE_HIT {
+    if hit.kind == HIT_SURFACE {
         return hit;
     }
     // The crossing may fall exactly between two texels: the one in front may hold the surface.
@@ -56,7 +56,7 @@ fn march_map(map: u32, x: vec3f, r: vec3f, start: f32, starts_in_front: bool) ->
     let first_angle = atan((start - closest) / aside);
     let last_angle = atan((TRACE_FURTHEST - closest) / aside);
     let steps = u32(ceil((last_angle - first_angle) / MARCH_STEP));
-    var result = March(TRACE_LOST, start, trace_nothing(TRACE_LOST));
+    var result = March(HIT_LOST, start, hit_nothing(HIT_LOST));
     var is_certain = starts_in_front;
     var in_front = starts_in_front;
     var previous = vec2f(start, 1.0);
@@ -69,9 +69,9 @@ fn march_map(map: u32, x: vec3f, r: vec3f, start: f32, starts_in_front: bool) ->
         let w = trace_ratio(map, x + t * r);
         if in_front && w < 1.0 {
             let hit = march_refine(map, x, r, previous, vec2f(t, w));
-            if hit.kind == TRACE_HIT {
+            if hit.kind == HIT_SURFACE {
                 result.hit = hit;
-                result.kind = select(TRACE_LOST, TRACE_HIT, is_certain);
+                result.kind = select(HIT_LOST, HIT_SURFACE, is_certain);
                 return result;
             }
             is_certain = false;
@@ -83,7 +83,7 @@ fn march_map(map: u32, x: vec3f, r: vec3f, start: f32, starts_in_front: bool) ->
         }
     }
     if is_certain {
-        result.kind = TRACE_ESCAPED;
+        result.kind = HIT_ESCAPED;
     }
     return result;
 }
@@ -114,7 +114,7 @@ fn march_knows(map: u32, x: vec3f, normal: vec3f, r: vec3f, free: f32) -> bool {
 // behind walls; only a ray whose origin no map knows is looked for everywhere.
 fn ordered_march_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
     var free = 0.0;
-    var tentative = trace_nothing(TRACE_LOST);
+    var tentative = hit_nothing(HIT_LOST);
     var is_known = false;
     for (var round = 0u; round < 2u && !is_known; round++) {
         var ordered = vec2f(-1.0, -1.0);
@@ -133,18 +133,18 @@ fn ordered_march_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
             is_known = is_known || knows;
             var march = march_map(map, x, r, free, knows);
             march.hit.position += center;
-            if march.kind == TRACE_HIT {
+            if march.kind == HIT_SURFACE {
                 return march.hit;
             }
-            if march.kind == TRACE_ESCAPED {
-                return trace_nothing(TRACE_ESCAPED);
+            if march.kind == HIT_ESCAPED {
+                return hit_nothing(HIT_ESCAPED);
             }
             free = march.free;
             // A crossing that this map knows to lie in free space is no surface.
-            if tentative.kind == TRACE_HIT && tentative.distance < free {
-                tentative = trace_nothing(TRACE_LOST);
+            if tentative.kind == HIT_SURFACE && tentative.distance < free {
+                tentative = hit_nothing(HIT_LOST);
             }
-            if march.hit.kind == TRACE_HIT && (tentative.kind != TRACE_HIT || march.hit.distance < tentative.distance) {
+            if march.hit.kind == HIT_SURFACE && (tentative.kind != HIT_SURFACE || march.hit.distance < tentative.distance) {
                 tentative = march.hit;
             }
         }

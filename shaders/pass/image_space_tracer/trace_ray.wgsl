@@ -1,16 +1,28 @@
 // Ray against k environment maps: what the two ways of searching share, and the choice between them.
 
+struct Params {
+    map_count: u32,
+    map_size: u32,
+    iterations: u32,
+    // 1 - cos of the largest angle that the paper's test accepts
+    epsilon: f32,
+}
+
+@group(1) @binding(0) var<uniform> params: Params;
+@group(1) @binding(1) var env_maps: texture_2d_array<u32>;
+// w: 1 where the map is to be asked, 0 where it is switched off
+@group(1) @binding(2) var<storage, read> centers: array<vec4f>;
+
 // 0: false position, accepted by angle, as in the paper. 1: false position, accepted by the texel's plane.
 // 2: ordered march.
 override method: u32 = 2u;
 
 const METHOD_PAPER: u32 = 0u;
 const METHOD_PLANE: u32 = 1u;
-const TRACE_HIT: u32 = 1u;
-const TRACE_ESCAPED: u32 = 2u;
-const TRACE_LOST: u32 = 3u;
 
-// Rays are searched from here to there, unit frame: a thousandth of a region of radius 1, and a little over the diameter
+// Rays leave a surface from this far above it, along its geometric normal, unit frame.
+const TRACE_OFFSET: f32 = 0x1p-12;
+// They are searched from here to there, unit frame: a thousandth of a region of radius 1, and a little over the diameter
 // of one that grew to a radius of 2 since the frame was made.
 const TRACE_NEAREST: f32 = 0x1p-10;
 const TRACE_FURTHEST: f32 = 5.0;
@@ -20,18 +32,6 @@ const TRACE_SKY: f32 = 16.0;
 const TRACE_FOOTPRINT: f32 = 1.5;
 // A map sees the origin if it lies no further behind the texel's plane than this (unit frame) plus a quarter texel.
 const TRACE_BEHIND: f32 = 0x1p-9;
-
-struct Hit {
-    kind: u32,
-    distance: f32,
-    position: vec3f,
-    normal: vec3f,
-    reflectance: vec3f,
-}
-
-fn trace_nothing(kind: u32) -> Hit {
-    return Hit(kind, TRACE_FURTHEST, vec3f(0.0), vec3f(0.0), vec3f(0.0));
-}
 
 // Whether a map is to be asked: while its place is not yet known to be a good one it may be switched off.
 fn trace_is_on(map: u32) -> bool {
@@ -62,21 +62,21 @@ fn trace_accept_plane(texel: EnvMapTexel, x: vec3f, r: vec3f) -> Hit {
     let n = texel.surface.normal;
     let toward = dot(n, r);
     if toward > -1e-4 {
-        return trace_nothing(TRACE_LOST);
+        return hit_nothing(HIT_LOST);
     }
     let distance = dot(n, texel.direction * texel.surface.distance - x) / toward;
     if !(distance >= TRACE_NEAREST && distance <= TRACE_FURTHEST) {
-        return trace_nothing(TRACE_LOST);
+        return hit_nothing(HIT_LOST);
     }
     let p = x + distance * r;
     if dot(p, cube_face_forward(texel.face)) <= 0.0 {
-        return trace_nothing(TRACE_LOST);
+        return hit_nothing(HIT_LOST);
     }
     let away = abs(cube_face_uv(texel.face, p) * f32(params.map_size) - texel.middle);
     if max(away.x, away.y) > TRACE_FOOTPRINT {
-        return trace_nothing(TRACE_LOST);
+        return hit_nothing(HIT_LOST);
     }
-    return Hit(TRACE_HIT, distance, p, n, texel.surface.reflectance);
+    return Hit(HIT_SURFACE, distance, p, n, texel.surface.reflectance);
 }
 
 // Whether a map sees a surface point from its front: then the ray starts in space that the map knows.
@@ -90,7 +90,8 @@ fn trace_sees(map: u32, x: vec3f, n: vec3f) -> bool {
     return texel.surface.distance > 0.0 && dot(texel.surface.normal, offset) >= -behind;
 }
 
-fn trace_ray(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
+fn trace_ray(position: vec3f, normal: vec3f, r: vec3f) -> Hit {
+    let origin = position + TRACE_OFFSET * normal;
     if method <= METHOD_PLANE {
         return false_position_trace(origin, normal, r);
     }

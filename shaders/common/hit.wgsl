@@ -1,0 +1,21 @@
+// What a ray meets. Every tracer of the photon walk has a `trace_ray(position, normal, direction) -> Hit`: from a point of
+// a surface, along a unit direction on the side that the geometric normal points to.
+
+const HIT_SURFACE: u32 = 1u;
+const HIT_ESCAPED: u32 = 2u;
+const HIT_LOST: u32 = 3u;
+
+struct Hit {
+    // HIT_SURFACE: all else holds. HIT_ESCAPED: there is nothing. HIT_LOST: the tracer cannot tell.
+    kind: u32,
+    distance: f32,
+    // Unit frame
+    position: vec3f,
+    // Geometric, on the side hit
+    normal: vec3f,
+    reflectance: vec3f,
+}
+
+fn hit_nothing(kind: u32) -> Hit {
+    return Hit(kind, 0.0, vec3f(0.0), vec3f(0.0), vec3f(0.0));
+}

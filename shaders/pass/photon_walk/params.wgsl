@@ -1,0 +1,13 @@
+// The uniform of a walk.
+
+struct WalkParams {
+    photon_count: u32,
+    // Walked are these hops and those between them
+    first_hop: u32,
+    last_hop: u32,
+    // First scattering that Russian roulette may end
+    roulette_from: u32,
+    sample_offset: u32,
+    // Invocations in a row of the dispatch over all paths
+    row: u32,
+}
