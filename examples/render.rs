@@ -13,8 +13,10 @@ use clap::{Parser, ValueEnum};
 use common::adapter::{Gpu, Wishes};
 use common::clock::Clock;
 use common::offline::{Component, Offline};
+use common::reference::Reference;
 use common::{arguments, exr_file, gltf_scene, picture, progress};
 use lightfall::frame::{GiRenderer, Plan, Settings};
+use lightfall::reference::{PathComponent, PathEstimate, PathTracerSettings};
 use lightfall::scene::{Scene, SceneSummary, samples};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -27,9 +29,9 @@ enum Part {
     Direct,
     /// All but direct.
     Indirect,
-    /// Not available yet.
+    /// Light that reached a diffuse surface through metals and glass alone: for the reference preset.
     Caustic,
-    /// Not available yet.
+    /// What the eye sees of metals and glass: for the reference preset.
     Specular,
 }
 
@@ -55,7 +57,7 @@ enum Method {
 #[derive(Parser)]
 #[command(
     args_override_self = true,
-    after_help = "Not available yet: --preset reference, --component caustic|specular, --tracer bvh|hybrid, \
+    after_help = "Not available yet: --component caustic|specular but for --preset reference, --tracer bvh|hybrid, \
     --method surface-lights|illumination-maps, --budget-ms, glTF skins."
 )]
 struct Arguments {
@@ -71,7 +73,7 @@ struct Arguments {
     /// Index of the file's camera
     #[arg(long, default_value_t = 0)]
     camera: usize,
-    /// fast, balanced, accurate
+    /// fast, balanced, accurate; reference: path tracing
     #[arg(long, default_value = "balanced")]
     preset: String,
     /// Which part of the light to keep
@@ -131,6 +133,9 @@ fn fail(message: &str) -> ! {
 }
 
 fn run(arguments: &Arguments) -> Result<(), String> {
+    if arguments.preset == REFERENCE {
+        return run_reference(arguments);
+    }
     let component = check_available(arguments)?;
     let settings = settings(arguments)?;
     let times = times(arguments)?;
@@ -185,14 +190,154 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     Ok(())
 }
 
+/// The preset that is no `Settings`: the path tracer.
+const REFERENCE: &str = "reference";
+/// Samples a pixel that it takes unless told otherwise.
+const REFERENCE_FRAMES: u32 = 256;
+
+fn run_reference(arguments: &Arguments) -> Result<(), String> {
+    let settings = reference_settings(arguments)?;
+    let times = times(arguments)?;
+    let scene = load(arguments, times[0])?;
+    let summary = SceneSummary::of(&scene).map_err(|e| format!("{}: {e}", arguments.scene))?;
+    check_scene(arguments, &scene, &summary)?;
+    if arguments.explain {
+        println!("every pixel is path traced: no stage of the plan runs");
+        return Ok(());
+    }
+    let wishes = Wishes {
+        timestamps: true,
+        large_buffers: true,
+        ..Default::default()
+    };
+    let gpu = Gpu::open(arguments.adapter.as_deref(), wishes)?;
+    let frames = arguments.frames.unwrap_or(REFERENCE_FRAMES);
+    let size = [arguments.width, arguments.height];
+    let mut clock = Clock::new(&gpu);
+    let bar = progress::bar(times.len() as u64 * u64::from(frames));
+    for (number, &time) in times.iter().enumerate() {
+        let scene = if number > 0 {
+            load(arguments, time)?
+        } else {
+            scene.clone()
+        };
+        let setup = Instant::now();
+        let mut reference =
+            Reference::new(&gpu, scene, &settings, arguments.camera, size).map_err(|e| e.to_string())?;
+        let setup_ms = setup.elapsed().as_secs_f64() * 1e3;
+        for _ in 0..frames {
+            clock.time(&gpu, |timestamps| reference.render_sample(timestamps))?;
+            bar.inc(1);
+        }
+        gpu.check()?;
+        let estimate = reference.read().map_err(|e| e.to_string())?;
+        if let Some(out) = &arguments.out {
+            let path = if arguments.animate.is_some() {
+                numbered(out, number)
+            } else {
+                out.clone()
+            };
+            write_reference(&gpu, &mut reference, &estimate, &path, arguments)?;
+        }
+        if let Some(path) = &arguments.stats {
+            let report = reference_report(&gpu, &reference, (&settings, frames), (setup_ms, &clock), &estimate);
+            let text = serde_json::to_string_pretty(&report).map_err(|e| e.to_string())?;
+            exr_file::replace_file(path, text.as_bytes())?;
+        }
+    }
+    bar.finish_and_clear();
+    gpu.check()
+}
+
+fn reference_settings(arguments: &Arguments) -> Result<PathTracerSettings, String> {
+    if !arguments.set.is_empty() {
+        return Err("--set: the reference has no settings; --bounces, --frames and --component are its options".into());
+    }
+    if arguments.frames == Some(0) {
+        return Err("--frames 0: expected 1 or more".into());
+    }
+    let default = PathTracerSettings::default();
+    Ok(PathTracerSettings {
+        component: match arguments.component {
+            Part::All => PathComponent::All,
+            Part::Direct => PathComponent::Direct,
+            Part::Indirect => PathComponent::Indirect,
+            Part::Caustic => PathComponent::Caustic,
+            Part::Specular => PathComponent::Specular,
+        },
+        bounces: arguments.bounces.unwrap_or(default.bounces),
+        ..default
+    })
+}
+
+/// An EXR file holds the standard error of each pixel beside its mean.
+fn write_reference(
+    gpu: &Gpu,
+    reference: &mut Reference<'_>,
+    estimate: &PathEstimate,
+    path: &Path,
+    arguments: &Arguments,
+) -> Result<(), String> {
+    let size = [arguments.width, arguments.height];
+    if extension(path) == "exr" {
+        let channel = |c: usize| estimate.standard_error.iter().map(|e| e[c]).collect();
+        let errors = [
+            ("stderr.R", channel(0)),
+            ("stderr.G", channel(1)),
+            ("stderr.B", channel(2)),
+        ];
+        return exr_file::write_rgb_and(path, size, &estimate.mean, &errors);
+    }
+    let exposure = arguments
+        .exposure
+        .unwrap_or_else(|| picture::exposure_for(&estimate.mean));
+    let image = reference.resolve().map_err(|e| e.to_string())?;
+    picture::write_png((&gpu.device, &gpu.queue), path, &image, exposure)
+}
+
+fn describe(gpu: &Gpu) -> Value {
+    json!({
+        "name": gpu.info.name, "backend": gpu.info.backend.to_string(),
+        "kind": format!("{:?}", gpu.info.device_type), "driver": gpu.info.driver_info,
+    })
+}
+
+fn reference_report(
+    gpu: &Gpu,
+    reference: &Reference<'_>,
+    (settings, frames): (&PathTracerSettings, u32),
+    (setup_ms, clock): (f64, &Clock),
+    estimate: &PathEstimate,
+) -> Value {
+    let [median, min, max] = clock.frame_ms();
+    let by_resource = reference.memory_by_resource();
+    let stages: Vec<Value> = clock
+        .stages_ms()
+        .map(|(name, ms)| json!({"name": name.trim_start_matches("lightfall::"), "ms": ms}))
+        .collect();
+    json!({
+        "adapter": describe(gpu),
+        "size": reference.size(),
+        "frames": frames,
+        "settings": {"component": format!("{:?}", settings.component), "bounces": settings.bounces,
+            "roulette_from": settings.roulette_from},
+        "time": {
+            "clock": clock.kind(), "setup_ms": setup_ms,
+            "frame_ms": {"median": median, "min": min, "max": max}, "stages": stages,
+        },
+        "bytes": {
+            "total": by_resource.iter().map(|r| r.1).sum::<u64>(),
+            "by_resource": by_resource.into_iter().collect::<std::collections::BTreeMap<_, _>>(),
+        },
+        "error_estimate": {"relmse": estimate.relative_variance(), "noise": estimate.relative_variance(), "bias": 0.0},
+    })
+}
+
 /// Refuses what a later version will do, by name; returns the component.
 fn check_available(arguments: &Arguments) -> Result<Component, String> {
     let not_yet = |what: &str| Err(format!("{what}: not available yet"));
     if arguments.budget_ms.is_some() {
         return not_yet("--budget-ms");
-    }
-    if arguments.preset == "reference" {
-        return not_yet("--preset reference");
     }
     if arguments.tracer != Tracer::ImageSpace {
         return not_yet("--tracer bvh and hybrid");
@@ -204,13 +349,17 @@ fn check_available(arguments: &Arguments) -> Result<Component, String> {
         Part::All => Ok(Component::All),
         Part::Direct => Ok(Component::Direct),
         Part::Indirect => Ok(Component::Indirect),
-        Part::Caustic | Part::Specular => not_yet("--component caustic and specular"),
+        Part::Caustic | Part::Specular => not_yet("--component caustic and specular, but for --preset reference,"),
     }
 }
 
 fn settings(arguments: &Arguments) -> Result<Settings, String> {
-    let mut settings = Settings::preset(&arguments.preset)
-        .ok_or_else(|| format!("--preset {:?}: expected fast, balanced or accurate", arguments.preset))?;
+    let mut settings = Settings::preset(&arguments.preset).ok_or_else(|| {
+        format!(
+            "--preset {:?}: expected fast, balanced, accurate or reference",
+            arguments.preset
+        )
+    })?;
     let mut set = |key: &str, value: &str| settings.set(key, value).map_err(|e| e.to_string());
     for pair in &arguments.set {
         let (key, value) = pair
@@ -324,10 +473,7 @@ fn report(
         .map(|(name, ms)| json!({"name": name.trim_start_matches("lightfall::"), "ms": ms}))
         .collect();
     Ok(json!({
-        "adapter": {
-            "name": gpu.info.name, "backend": gpu.info.backend.to_string(),
-            "kind": format!("{:?}", gpu.info.device_type), "driver": gpu.info.driver_info,
-        },
+        "adapter": describe(gpu),
         "size": offline.view.g_buffer().size(),
         "frames": settings.frames,
         "settings": settings.entries().into_iter().collect::<std::collections::BTreeMap<_, _>>(),

@@ -2,7 +2,7 @@
 
 use super::adapter::Gpu;
 use super::offline::Offline;
-use lightfall::Timestamps;
+use lightfall::{Error, Timestamps};
 
 /// Renders frames and keeps their times: of GPU timestamps where the device has them, else on the wall. A stage that runs
 /// in some frames only counts for its share.
@@ -31,10 +31,17 @@ impl Clock {
 
     /// Renders the next frame.
     pub(crate) fn frame(&mut self, gpu: &Gpu, offline: &mut Offline<'_>) -> Result<(), String> {
+        self.time(gpu, |timestamps| offline.render_frame(timestamps))
+    }
+
+    /// Renders something and waits for it.
+    pub(crate) fn time(
+        &mut self,
+        gpu: &Gpu,
+        render: impl FnOnce(Option<&Timestamps>) -> Result<(), Error>,
+    ) -> Result<(), String> {
         let start = std::time::Instant::now();
-        offline
-            .render_frame(self.timestamps.as_ref())
-            .map_err(|e| e.to_string())?;
+        render(self.timestamps.as_ref()).map_err(|e| e.to_string())?;
         let wall_ms = start.elapsed().as_secs_f64() * 1e3;
         let stages = match &self.timestamps {
             Some(t) => t.take_blocking(&gpu.device, &gpu.queue).map_err(|e| e.to_string())?,

@@ -5,7 +5,7 @@
 
 use exr::meta::{MetaData, header::Header};
 use exr::prelude::{
-    AnyChannels, Encoding, FlatSamples, Layer, LayerAttributes, ReadChannels, ReadLayers, SpecificChannels, Vec2,
+    AnyChannel, AnyChannels, Encoding, FlatSamples, Layer, LayerAttributes, ReadChannels, ReadLayers, Vec2,
     WritableImage,
 };
 use std::collections::BTreeMap;
@@ -55,7 +55,21 @@ impl ExrChannels {
 /// A size that is zero, too large, or not that of the list; an error of the file system. The path then holds what it
 /// held before.
 pub(crate) fn write_rgb(path: &Path, width: u32, height: u32, pixels: &[[f32; 3]]) -> Result<(), String> {
-    let bytes = encode(width as usize, height as usize, pixels).map_err(|problem| at(path, &problem))?;
+    write_rgb_and(path, [width, height], pixels, &[])
+}
+
+/// As [`write_rgb`], with further channels by name, each as long as the image.
+///
+/// # Errors
+/// As [`write_rgb`].
+pub(crate) fn write_rgb_and(
+    path: &Path,
+    size: [u32; 2],
+    pixels: &[[f32; 3]],
+    others: &[(&str, Vec<f32>)],
+) -> Result<(), String> {
+    let size = size.map(|s| s as usize);
+    let bytes = encode(size, pixels, others).map_err(|problem| at(path, &problem))?;
     replace_file(path, &bytes)
 }
 
@@ -90,20 +104,21 @@ pub(crate) fn replace_file(path: &Path, bytes: &[u8]) -> Result<(), String> {
         })
 }
 
-fn encode(width: usize, height: usize, pixels: &[[f32; 3]]) -> Result<Vec<u8>, String> {
-    check_size(width, height, 3)?;
-    if pixels.len() != width * height {
-        return Err(format!("{} pixels given for {width} × {height}", pixels.len()));
+fn encode([width, height]: [usize; 2], pixels: &[[f32; 3]], others: &[(&str, Vec<f32>)]) -> Result<Vec<u8>, String> {
+    check_size(width, height, 3 + others.len())?;
+    let lengths = others.iter().map(|(_, values)| values.len()).chain([pixels.len()]);
+    if let Some(length) = lengths.into_iter().find(|&length| length != width * height) {
+        return Err(format!("{length} pixels given for {width} × {height}"));
     }
-    let channels = SpecificChannels::rgb(|Vec2(x, y): Vec2<usize>| {
-        let [r, g, b] = pixels[y * width + x];
-        (r, g, b)
-    });
+    let channel = |name: &str, values: Vec<f32>| AnyChannel::new(name, FlatSamples::F32(values));
+    let colors = ["R", "G", "B"].iter().enumerate();
+    let own = colors.map(|(c, name)| channel(name, pixels.iter().map(|p| p[c]).collect()));
+    let all = own.chain(others.iter().map(|(name, values)| channel(name, values.clone())));
     let layer = Layer::new(
         (width, height),
         LayerAttributes::default(),
         Encoding::SMALL_LOSSLESS,
-        channels,
+        AnyChannels::sort(all.collect()),
     );
     let mut bytes = Cursor::new(Vec::new());
     exr::prelude::Image::from_layer(layer)

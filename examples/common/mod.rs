@@ -8,8 +8,8 @@ pub(crate) mod exr_file;
 pub(crate) mod gltf_scene;
 pub(crate) mod offline;
 pub(crate) mod picture;
+pub(crate) mod progress;
 #[cfg(all(feature = "bvh", feature = "reference"))]
 pub(crate) mod reference;
-pub(crate) mod progress;
 #[cfg(feature = "reference")]
 pub(crate) mod truth_file;

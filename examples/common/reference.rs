@@ -87,6 +87,11 @@ impl<'a> Reference<'a> {
         Ok(image)
     }
 
+    /// Pixels.
+    pub(crate) fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
     /// Bytes by resource.
     pub(crate) fn memory_by_resource(&self) -> Vec<(&'static str, u64)> {
         vec![

@@ -149,6 +149,24 @@ pub struct PathEstimate {
     pub standard_error: Vec<[f32; 3]>,
 }
 
+impl PathEstimate {
+    /// The noise left, in the terms of [`metrics`](super::metrics): mean over pixels and channels of
+    /// σ² / (r² + (0.01 · mean r)²), σ the standard error and r the mean; what relMSE is expected to be against an exact
+    /// image.
+    #[must_use]
+    pub fn relative_variance(&self) -> f64 {
+        let values = || self.mean.iter().flatten().map(|&x| f64::from(x));
+        let count = values().count().max(1) as f64;
+        let guard = 0.01 * values().sum::<f64>() / count;
+        let errors = self.standard_error.iter().flatten().map(|&e| f64::from(e).powi(2));
+        let relative = values().zip(errors).map(|(r, variance)| {
+            let scale = r * r + guard * guard;
+            if scale > 0.0 { variance / scale } else { 0.0 }
+        });
+        relative.sum::<f64>() / count
+    }
+}
+
 impl PathTracer {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
