@@ -349,3 +349,197 @@ fn an_environment_image_lights_a_plane_from_where_it_shines() {
         }
     }
 }
+
+/// A box with a bulb, and in it a ball of brass and one of glass.
+fn box_with_balls() -> Scene {
+    let mut scene = samples::cornell(0.0);
+    scene.lights[0].kind = LightKind::Rectangle {
+        center: DVec3::new(2.78, 5.4, 2.795),
+        half_u: DVec3::new(0.7, 0.0, 0.0),
+        half_v: DVec3::new(0.0, 0.0, 0.7),
+    };
+    let ball = sphere(Material::default()).meshes.remove(0);
+    scene.meshes.push(ball);
+    for (name, material, at) in [
+        (
+            "brass",
+            Material {
+                base_color: [0.9, 0.7, 0.3],
+                metallic: 1.0,
+                roughness: 0.3,
+                ..Material::default()
+            },
+            DVec3::new(4.2, 0.8, 1.2),
+        ),
+        (
+            "glass",
+            Material {
+                transmission: 1.0,
+                roughness: 0.0,
+                ..Material::default()
+            },
+            DVec3::new(1.9, 2.35, 1.7),
+        ),
+    ] {
+        scene.materials.push(Material {
+            name: name.into(),
+            ..material
+        });
+        scene.instances.push(Instance {
+            transform: DAffine3::from_scale_rotation_translation(
+                DVec3::splat(0.7),
+                lightfall::glam::DQuat::IDENTITY,
+                at,
+            ),
+            ..Instance::new(scene.meshes.len() - 1, scene.materials.len() - 1)
+        });
+    }
+    scene
+}
+
+#[test]
+fn components_add_up_pixel_by_pixel() {
+    let Some(gpu) = gpu() else { return };
+    let scene = box_with_balls();
+    let part = |c| render(&gpu, &scene, &component(c, 5), [48, 48], 16).mean;
+    let all = part(PathComponent::All);
+    let (direct, indirect) = (part(PathComponent::Direct), part(PathComponent::Indirect));
+    let (caustic, specular) = (part(PathComponent::Caustic), part(PathComponent::Specular));
+    let sum = |image: &[[f32; 3]]| image.iter().flatten().map(|&x| f64::from(x)).sum::<f64>();
+    for pixel in 0..all.len() {
+        for c in 0..3 {
+            let (whole, parts) = (all[pixel][c], direct[pixel][c] + indirect[pixel][c]);
+            assert!((whole - parts).abs() <= 1e-5 * whole, "pixel {pixel}: {whole} {parts}");
+            assert!(caustic[pixel][c] <= indirect[pixel][c] * 1.00001, "pixel {pixel}");
+            assert!(specular[pixel][c] <= whole * 1.00001, "pixel {pixel}");
+            assert!(caustic[pixel][c] == 0.0 || specular[pixel][c] < whole, "pixel {pixel}");
+        }
+    }
+    println!(
+        "of all light: direct {:.3}, indirect {:.3}, caustic {:.3}, specular {:.3}",
+        sum(&direct) / sum(&all),
+        sum(&indirect) / sum(&all),
+        sum(&caustic) / sum(&all),
+        sum(&specular) / sum(&all)
+    );
+    assert!(sum(&caustic) > 0.0 && sum(&specular) > 0.0);
+}
+
+#[test]
+fn the_same_samples_give_the_same_bits_and_others_differ_by_the_standard_error() {
+    let Some(gpu) = gpu() else { return };
+    let scene = box_with_balls();
+    let settings = component(PathComponent::All, 3);
+    let mut reference = Reference::new(&gpu, scene.clone(), &settings, 0, [64, 64]).unwrap();
+    let mut estimate_of = |samples: u32| {
+        for _ in 0..samples {
+            reference.render_sample(None).unwrap();
+        }
+        reference.read().unwrap()
+    };
+    let first = estimate_of(64);
+    let both = estimate_of(64);
+    assert_eq!(first, render(&gpu, &scene, &settings, [64, 64], 64));
+    // The second half alone: twice the mean of all, less the first half.
+    let (mut squares, mut expected) = (0.0, 0.0);
+    for pixel in 0..first.mean.len() {
+        for c in 0..3 {
+            let (a, all) = (f64::from(first.mean[pixel][c]), f64::from(both.mean[pixel][c]));
+            squares += (2.0 * all - 2.0 * a).powi(2);
+            expected += 2.0 * f64::from(first.standard_error[pixel][c]).powi(2);
+        }
+    }
+    let ratio = squares / expected;
+    println!("squared difference of independent halves over what their standard errors say: {ratio:.3}");
+    assert!((0.7..1.4).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn a_textured_floor_shows_its_texture_and_its_holes() {
+    let Some(gpu) = gpu() else { return };
+    // Two by two texels, one of them a hole; seen from above, texels meet in the middle of the floor.
+    let texels = [
+        [255u8, 0, 0, 255],
+        [0, 255, 0, 255],
+        [0, 0, 255, 255],
+        [255, 255, 255, 0],
+    ];
+    let mut scene = floor(1.0, 1.0, 1.0);
+    scene.textures.push(lightfall::scene::Texture {
+        name: "four".into(),
+        width: 2,
+        height: 2,
+        srgb: true,
+        rgba: texels.concat(),
+    });
+    scene.meshes[0].tex_coords = vec![[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
+    scene.materials[0].base_color_texture = Some(0);
+    scene.materials[0].alpha_cutoff = Some(0.5);
+    scene.lights.push(Light {
+        color: [1.0; 3],
+        ..environment(None, 0.0)
+    });
+    // Under a uniform sky of radiance 2 a Lambertian floor of reflectance ρ shows 2 ρ; a hole shows the sky.
+    let size = 32;
+    let estimate = render(&gpu, &scene, &component(PathComponent::All, 0), [size, size], 256);
+    let at = |x: u32, y: u32| estimate.mean[(y * size + x) as usize];
+    for (x, y, expected) in [
+        (8, 8, [2.0, 0.0, 0.0]),
+        (24, 8, [0.0, 2.0, 0.0]),
+        (8, 24, [0.0, 0.0, 2.0]),
+        (24, 24, [2.0, 2.0, 2.0]),
+    ] {
+        for (found, expected) in at(x, y).into_iter().zip(expected) {
+            // A pixel away from the texel's middle a sixteenth of its neighbours is mixed in.
+            assert!((found - expected).abs() < 0.2, "pixel {x}, {y}: {:?}", at(x, y));
+        }
+    }
+    // The hole begins where alpha, interpolated, falls below a half: half-way between the texels' middles.
+    let row: Vec<bool> = (0..size).map(|x| at(x, 24).iter().all(|&v| v > 1.9)).collect();
+    let holes = row.iter().filter(|&&h| h).count();
+    assert!((14..=17).contains(&holes), "{row:?}");
+}
+
+#[test]
+fn what_does_not_shine_leaves_the_image_black() {
+    let Some(gpu) = gpu() else { return };
+    let mut dark = samples::cornell(0.0);
+    dark.lights.clear();
+    let estimate = render(&gpu, &dark, &unlimited(), [16, 16], 4);
+    assert!(estimate.mean.iter().flatten().all(|&v| v == 0.0));
+    assert_eq!(estimate.relative_variance(), 0.0);
+}
+
+#[test]
+fn doubling_all_lengths_and_powers_changes_no_bit_of_the_rescaled_image() {
+    let Some(gpu) = gpu() else { return };
+    let scene = box_with_balls();
+    let settings = component(PathComponent::All, 3);
+    let nominal = render(&gpu, &scene, &settings, [32, 32], 4);
+    for (length, power) in [(40, 0), (-40, 0), (0, 30), (3, -30)] {
+        let (length, power) = (2f64.powi(length), 2f64.powi(power));
+        let mut scaled = scene.clone();
+        for instance in &mut scaled.instances {
+            instance.transform = DAffine3::from_scale(DVec3::splat(length)) * instance.transform;
+        }
+        for camera in &mut scaled.cameras {
+            camera.transform.translation *= length;
+        }
+        for light in &mut scaled.lights {
+            if let LightKind::Rectangle { center, half_u, half_v } = &mut light.kind {
+                *center *= length;
+                *half_u *= length;
+                *half_v *= length;
+            }
+            light.intensity *= power as f32;
+        }
+        let estimate = render(&gpu, &scaled, &settings, [32, 32], 4);
+        for (a, b) in nominal.mean.iter().flatten().zip(estimate.mean.iter().flatten()) {
+            assert_eq!(
+                *a,
+                (f64::from(*b) / power) as f32,
+                "lengths × {length}, powers × {power}"
+            );
+        }
+    }
+}
