@@ -64,6 +64,17 @@ impl Gpu {
         std::mem::take(&mut self.errors.lock().expect("no holder panics"))
     }
 
+    /// Name, backend and driver of the adapter.
+    pub(crate) fn describe(&self) -> String {
+        let wgpu::AdapterInfo {
+            name,
+            backend,
+            driver_info,
+            ..
+        } = &self.info;
+        format!("{name} ({backend}, {driver_info})")
+    }
+
     /// Whether the device rendered as it was told; if not, nothing of it should be shown or written.
     pub(crate) fn check(&self) -> Result<(), String> {
         match self.take_errors().first() {

@@ -4,12 +4,19 @@
 pub(crate) mod adapter;
 pub(crate) mod arguments;
 pub(crate) mod clock;
+#[cfg(feature = "reference")]
+pub(crate) mod contact_sheet;
+#[cfg(feature = "reference")]
+pub(crate) mod difference;
 pub(crate) mod exr_file;
 pub(crate) mod gltf_scene;
+pub(crate) mod lettering;
 pub(crate) mod offline;
 pub(crate) mod picture;
 pub(crate) mod progress;
 #[cfg(all(feature = "bvh", feature = "reference"))]
 pub(crate) mod reference;
+#[cfg(feature = "reference")]
+pub(crate) mod report;
 #[cfg(feature = "reference")]
 pub(crate) mod truth_file;
