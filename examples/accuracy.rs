@@ -6,7 +6,8 @@
 //!
 //! SCENES holds `NAME.glb` or `NAME.gltf`, TRUTH holds `NAME.COMPONENT.exr`; every reference whose scene is there is
 //! rendered with every preset, at the reference's size, through the file's first camera. COMPONENT is `direct`,
-//! `indirect`, `all`, or `light_traced`: all light again, by a renderer that finds caustics.
+//! `indirect`, `all`, or `light_traced`: all light again, by a renderer that finds caustics. The preset `reference` is the
+//! path tracer, whose frames are samples a pixel.
 //!
 //! Each finished row is kept in the folder `--out`: a line in `rows.jsonl` and the image. Rows that are there, rendered
 //! on the same adapter, are not rendered again unless `--fresh` is given; after a change of the renderer it has to be.
@@ -23,11 +24,13 @@ use common::adapter::{Gpu, Wishes};
 use common::clock::Clock;
 use common::contact_sheet::{self, Labelled, Line};
 use common::offline::{Component, Offline};
+use common::reference::{self, Reference as PathTraced};
 use common::{arguments, exr_file, gltf_scene, progress, report, truth_file};
 use indicatif::{ProgressBar, ProgressStyle};
 use lightfall::frame::{GiRenderer, Settings};
 use lightfall::reference::metrics::{self, Image, Truth};
-use lightfall::scene::Scene;
+use lightfall::reference::{PathComponent, PathTracerSettings};
+use lightfall::scene::{Scene, SceneSummary};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -35,7 +38,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// All presets, in the order of the table; [`render`] knows what they mean.
-const PRESETS: [&str; 3] = ["fast", "balanced", "accurate"];
+const PRESETS: [&str; 4] = ["fast", "balanced", "accurate", reference::PRESET];
 
 /// What a reference may hold, and what is rendered to compare with it.
 const COMPONENTS: [(&str, Component); 4] = [
@@ -58,7 +61,7 @@ struct Arguments {
     /// Folder of the references, NAME.COMPONENT.exr
     #[arg(value_name = "TRUTH")]
     truth_folder: PathBuf,
-    /// Only these presets (default: fast, balanced, accurate)
+    /// Only these presets (default: fast, balanced, accurate, reference)
     #[arg(long, value_delimiter = ',')]
     presets: Vec<String>,
     /// Only these scenes
@@ -389,9 +392,25 @@ fn required_features() -> lightfall::wgpu::Features {
 
 /// Renders a scene as its first camera sees it. `on_frame` is told the number of each frame, from 1, and of how many.
 fn render(gpu: &Gpu, scene: Scene, job: &Job<'_>, on_frame: &dyn Fn(u32, u32)) -> Result<Rendering, String> {
-    let mut settings = Settings::preset(job.preset).ok_or_else(|| format!("there is no preset {:?}", job.preset))?;
-    settings.bounces = job.bounces;
-    settings.frames = job.frames.unwrap_or(settings.frames);
+    match Settings::preset(job.preset) {
+        Some(settings) => render_frames(gpu, scene, settings, job, on_frame),
+        None if job.preset == reference::PRESET => trace_paths(gpu, scene, job, on_frame),
+        None => Err(format!("there is no preset {:?}", job.preset)),
+    }
+}
+
+fn render_frames(
+    gpu: &Gpu,
+    scene: Scene,
+    preset: Settings,
+    job: &Job<'_>,
+    on_frame: &dyn Fn(u32, u32),
+) -> Result<Rendering, String> {
+    let settings = Settings {
+        bounces: job.bounces,
+        frames: job.frames.unwrap_or(preset.frames),
+        ..preset
+    };
     settings.validate().map_err(|error| error.to_string())?;
     let (_, component) = job.reference.component;
     let mut offline = Offline::new(gpu, scene, &settings, 0, job.size, component).map_err(|error| error.to_string())?;
@@ -403,17 +422,51 @@ fn render(gpu: &Gpu, scene: Scene, job: &Job<'_>, on_frame: &dyn Fn(u32, u32)) -
     let pixels = offline.read().map_err(|error| error.to_string())?;
     clock.settle(gpu, &mut offline)?;
     gpu.check()?;
-    let [frame_ms, ..] = clock.frame_ms();
+    let simplifications = offline.renderer.plan().map(|plan| plan.simplifications.clone());
     Ok(Rendering {
         pixels,
         frames: settings.frames,
-        frame_ms,
+        frame_ms: clock.frame_ms()[0],
         clock: clock.kind(),
-        simplifications: offline
-            .renderer
-            .plan()
-            .map(|plan| plan.simplifications.clone())
-            .unwrap_or_default(),
+        simplifications: simplifications.unwrap_or_default(),
+    })
+}
+
+fn trace_paths(gpu: &Gpu, scene: Scene, job: &Job<'_>, on_frame: &dyn Fn(u32, u32)) -> Result<Rendering, String> {
+    let settings = PathTracerSettings {
+        component: match job.reference.component.1 {
+            Component::All => PathComponent::All,
+            Component::Direct => PathComponent::Direct,
+            Component::Indirect => PathComponent::Indirect,
+        },
+        bounces: job.bounces,
+        ..Default::default()
+    };
+    let summary = SceneSummary::of(&scene).map_err(|error| error.to_string())?;
+    let samples = job.frames.unwrap_or(reference::SAMPLES);
+    let mut traced = PathTraced::new(gpu, scene, &settings, 0, job.size).map_err(|error| error.to_string())?;
+    let mut clock = Clock::new(gpu);
+    for sample in 1..=samples {
+        on_frame(sample, samples);
+        clock.time(gpu, |timestamps| traced.render_sample(timestamps))?;
+    }
+    let pixels = traced.read().map_err(|error| error.to_string())?.mean;
+    // The first one does not count.
+    for _ in samples..4 {
+        clock.time(gpu, |timestamps| traced.render_sample(timestamps))?;
+    }
+    gpu.check()?;
+    let is_specular = !summary.metals.is_empty() || !summary.dielectrics.is_empty();
+    let missing = "caustics of lights without extent are not found".to_owned();
+    Ok(Rendering {
+        pixels,
+        frames: samples,
+        frame_ms: clock.frame_ms()[0],
+        clock: clock.kind(),
+        simplifications: (is_specular && summary.lights > 0)
+            .then_some(missing)
+            .into_iter()
+            .collect(),
     })
 }
 
@@ -514,6 +567,7 @@ fn command(arguments: &Arguments) -> String {
         ("presets", &arguments.presets),
         ("scenes", &arguments.scenes),
         ("components", &arguments.components),
+        ("unpictured", &arguments.unpictured),
     ] {
         if !names.is_empty() {
             command += &format!(" --{option} {}", names.join(","));
@@ -547,5 +601,5 @@ fn with_table(docs: &Path, table: &str) -> Result<String, String> {
         .and_then(|(before, rest)| rest.split_once(TABLE_END).map(|(_, after)| (before, after)));
     let (before, after) =
         parts.ok_or_else(|| format!("{}: expected {TABLE_BEGIN} and {TABLE_END} after it", path.display()))?;
-    Ok(format!("{before}{TABLE_BEGIN}\n{table}{TABLE_END}{after}"))
+    Ok(format!("{before}{TABLE_BEGIN}\n\n{table}\n{TABLE_END}{after}"))
 }

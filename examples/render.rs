@@ -13,7 +13,7 @@ use clap::{Parser, ValueEnum};
 use common::adapter::{Gpu, Wishes};
 use common::clock::Clock;
 use common::offline::{Component, Offline};
-use common::reference::Reference;
+use common::reference::{self, Reference};
 use common::{arguments, exr_file, gltf_scene, picture, progress};
 use lightfall::frame::{GiRenderer, Plan, Settings};
 use lightfall::reference::{PathComponent, PathEstimate, PathTracerSettings};
@@ -133,7 +133,7 @@ fn fail(message: &str) -> ! {
 }
 
 fn run(arguments: &Arguments) -> Result<(), String> {
-    if arguments.preset == REFERENCE {
+    if arguments.preset == reference::PRESET {
         return run_reference(arguments);
     }
     let component = check_available(arguments)?;
@@ -190,11 +190,6 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     Ok(())
 }
 
-/// The preset that is no `Settings`: the path tracer.
-const REFERENCE: &str = "reference";
-/// Samples a pixel that it takes unless told otherwise.
-const REFERENCE_FRAMES: u32 = 256;
-
 fn run_reference(arguments: &Arguments) -> Result<(), String> {
     let settings = reference_settings(arguments)?;
     let times = times(arguments)?;
@@ -211,7 +206,7 @@ fn run_reference(arguments: &Arguments) -> Result<(), String> {
         ..Default::default()
     };
     let gpu = Gpu::open(arguments.adapter.as_deref(), wishes)?;
-    let frames = arguments.frames.unwrap_or(REFERENCE_FRAMES);
+    let frames = arguments.frames.unwrap_or(reference::SAMPLES);
     let size = [arguments.width, arguments.height];
     let mut clock = Clock::new(&gpu);
     let bar = progress::bar(times.len() as u64 * u64::from(frames));

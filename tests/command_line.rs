@@ -346,7 +346,7 @@ fn accuracy_measures_an_image_against_itself_as_exact() {
     let page = std::fs::read_to_string(folder.join("accuracy.md")).unwrap();
     assert_eq!(
         page,
-        format!("# Page\n\n<!-- accuracy table: begin -->\n{table}<!-- accuracy table: end -->\n\nEnd.\n")
+        format!("# Page\n\n<!-- accuracy table: begin -->\n\n{table}\n<!-- accuracy table: end -->\n\nEnd.\n")
     );
     // Reference, and twice image and error, all of 40 pixels, 6 apart.
     let sheet = image::open(folder.join("accuracy.png")).unwrap().to_rgb8();
@@ -388,6 +388,24 @@ fn accuracy_renders_a_row_once_unless_told_otherwise() {
 }
 
 #[test]
+fn accuracy_measures_the_path_tracer_too() {
+    if !can_render() {
+        return;
+    }
+    let folder = accuracy_folder("path-traced");
+    let output = accuracy(&folder, &["--presets", "reference", "--frames", "2"]);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let row = &rows(&folder)[0];
+    assert_eq!((&row["preset"], &row["frames"]), (&json!("reference"), &json!(2)));
+    assert_eq!(row["figures"]["finite"], true);
+    // The chrome is modelled, so that it is not what `fast` made of it.
+    assert!(row["figures"]["relmse"].as_f64().unwrap() > 1e-3, "{row}");
+    assert!(row["simplifications"].to_string().contains("caustics"), "{row}");
+    assert!(row["frame_ms"].as_f64().unwrap() > 0.0, "{row}");
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
 fn accuracy_goes_on_after_a_scene_that_fails() {
     if !can_render() {
         return;
@@ -422,7 +440,7 @@ fn accuracy_refuses_bad_input_before_it_renders() {
         assert_eq!(lines.len(), 1, "{options:?}: {lines:?}");
         assert!(lines[0].contains(word), "{options:?}: {}", lines[0]);
     };
-    refused(&["--presets", "best"], "fast, balanced, accurate");
+    refused(&["--presets", "best"], "fast, balanced, accurate, reference");
     refused(&["--components", "shiny"], "indirect");
     refused(&["--scenes", "plane,teapot"], "teapot");
     refused(&["--components", "indirect"], "no reference");

@@ -8,6 +8,11 @@ use lightfall::resource::{BvhGeometry, BvhGeometryConfig, Radiance};
 use lightfall::scene::{Scene, SceneSummary, UnitFrame};
 use lightfall::{Error, Timestamps};
 
+/// The preset that is no `Settings`.
+pub(crate) const PRESET: &str = "reference";
+/// Samples a pixel that it takes unless told otherwise.
+pub(crate) const SAMPLES: u32 = 256;
+
 /// A scene on the GPU and what its paths have brought so far.
 pub(crate) struct Reference<'a> {
     gpu: &'a Gpu,
