@@ -6,10 +6,11 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A mesh, instance, material, texture, light or camera holds something that cannot be rendered.
+    /// A mesh, instance, material, texture, environment, light or camera holds something that cannot be rendered.
     #[error("{item} {name:?}: {field} {problem}")]
     InvalidScene {
-        /// What kind of thing it is: "mesh", "instance", "material", "texture", "light", "environment", "camera", "summary".
+        /// What kind of thing it is: "mesh", "instance", "material", "texture", "environment", "light", "camera",
+        /// "summary".
         item: &'static str,
         /// Its name, or its index where it has none.
         name: String,

@@ -8,7 +8,7 @@ use lightfall::resource::{
     EnvMaps, GBuffer, GBufferViews, Irradiance, Lights, MAX_LIGHTS, MeshGeometry, NormalEncoding, Photons, Radiance,
     Visibility,
 };
-use lightfall::scene::{Light, LightKind, Scene, SceneBounds, SceneSummary, UnitFrame, samples};
+use lightfall::scene::{EnvironmentImage, Light, LightKind, Scene, SceneBounds, SceneSummary, UnitFrame, samples};
 use lightfall::{Error, Timestamps, wgpu};
 
 /// Runs on a fresh device and fails on any validation error.
@@ -30,6 +30,20 @@ fn refusal(change: impl FnOnce(&mut Scene)) -> String {
     let by_geometry = on_device(|device, queue| MeshGeometry::new(device, queue, &scene)).unwrap_err();
     assert_eq!(by_geometry, error);
     error.to_string()
+}
+
+/// Of a scene with an image of its surroundings.
+fn sky(change: impl FnOnce(&mut EnvironmentImage)) -> String {
+    refusal(|scene| {
+        let mut sky = EnvironmentImage {
+            name: "sky".into(),
+            width: 3,
+            height: 2,
+            rgb: vec![[1.0; 3]; 6],
+        };
+        change(&mut sky);
+        scene.environments.push(sky);
+    })
 }
 
 #[test]
@@ -123,6 +137,15 @@ fn a_bad_scene_is_refused_with_item_and_field_named() {
                 })
             }),
             &["texture", "wood", "15", "16"],
+        ),
+        (sky(|sky| sky.width = 0), &["environment", "sky", "size", "0×2"]),
+        (sky(|sky| sky.height = 0), &["sky", "size", "3×0"]),
+        (sky(|sky| sky.rgb.truncate(5)), &["sky", "rgb", "5", "6"]),
+        (sky(|sky| sky.rgb[4][2] = f32::NAN), &["sky", "texel (1, 1)", "NaN"]),
+        (sky(|sky| sky.rgb[2][0] = -1.0), &["sky", "texel (2, 0)", "-1"]),
+        (
+            sky(|sky| sky.rgb[0][1] = f32::INFINITY),
+            &["sky", "texel (0, 0)", "inf"],
         ),
     ];
     for (message, words) in cases {

@@ -38,6 +38,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Images that materials refer to.
     pub textures: Vec<Texture>,
+    /// Images that environment lights refer to.
+    pub environments: Vec<EnvironmentImage>,
     /// Placed meshes.
     pub instances: Vec<Instance>,
     /// Light sources without geometry. Emissive materials shine by themselves.
@@ -60,6 +62,9 @@ impl Scene {
         }
         for (index, material) in self.materials.iter().enumerate() {
             material.validate(index, self.textures.len())?;
+        }
+        for (index, image) in self.environments.iter().enumerate() {
+            image.validate(index)?;
         }
         for (index, mesh) in self.meshes.iter().enumerate() {
             mesh.validate(index)?;
