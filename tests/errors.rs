@@ -32,6 +32,37 @@ fn refusal(change: impl FnOnce(&mut Scene)) -> String {
     error.to_string()
 }
 
+/// Of a rectangle with these half sides.
+fn lamp(half_u: DVec3, half_v: DVec3) -> String {
+    refusal(|scene| {
+        scene.lights[0].kind = LightKind::Rectangle {
+            center: DVec3::ONE,
+            half_u,
+            half_v,
+        }
+    })
+}
+
+/// Of environment lights with these images and rotations, in a scene with one image.
+fn surroundings(lights: &[(Option<usize>, f64)]) -> String {
+    refusal(|scene| {
+        scene.environments.push(EnvironmentImage {
+            name: String::new(),
+            width: 1,
+            height: 1,
+            rgb: vec![[1.0; 3]],
+        });
+        for (index, &(image, rotation)) in lights.iter().enumerate() {
+            scene.lights.push(Light {
+                name: format!("sky light {index}"),
+                kind: LightKind::Environment { image, rotation },
+                color: [1.0; 3],
+                intensity: 1.0,
+            });
+        }
+    })
+}
+
 /// Of a scene with an image of its surroundings.
 fn sky(change: impl FnOnce(&mut EnvironmentImage)) -> String {
     refusal(|scene| {
@@ -137,6 +168,47 @@ fn a_bad_scene_is_refused_with_item_and_field_named() {
                 })
             }),
             &["texture", "wood", "15", "16"],
+        ),
+        (lamp(DVec3::X, 2.0 * DVec3::X), &["light", "bulb", "half_u and half_v"]),
+        // Parallel but for rounding.
+        (
+            lamp(DVec3::new(0.1, 0.2, 0.7), 3.1 * DVec3::new(0.1, 0.2, 0.7)),
+            &["bulb", "half_u and half_v", "not parallel"],
+        ),
+        (lamp(DVec3::ZERO, DVec3::X), &["bulb", "half_u and half_v", "not zero"]),
+        (
+            lamp(DVec3::X, DVec3::new(0.0, f64::NAN, 0.0)),
+            &["bulb", "half_u and half_v", "NaN"],
+        ),
+        (
+            lamp(DVec3::X, f64::INFINITY * DVec3::Y),
+            &["bulb", "half_u and half_v", "inf"],
+        ),
+        (
+            lamp(1e200 * DVec3::X, 1e200 * DVec3::Y),
+            &["bulb", "half_u and half_v", "finite"],
+        ),
+        (
+            refusal(|s| {
+                s.lights[0].kind = LightKind::Rectangle {
+                    center: DVec3::new(0.0, f64::NEG_INFINITY, 0.0),
+                    half_u: DVec3::X,
+                    half_v: DVec3::Z,
+                }
+            }),
+            &["bulb", "center", "-inf"],
+        ),
+        (
+            surroundings(&[(None, f64::NAN)]),
+            &["light", "sky light 0", "rotation", "NaN"],
+        ),
+        (
+            surroundings(&[(Some(1), 0.0)]),
+            &["sky light 0", "image", "is 1", "1 environment images"],
+        ),
+        (
+            surroundings(&[(None, 0.0), (Some(0), 0.0)]),
+            &["sky light 1", "second environment", "one at most"],
         ),
         (sky(|sky| sky.width = 0), &["environment", "sky", "size", "0×2"]),
         (sky(|sky| sky.height = 0), &["sky", "size", "3×0"]),
@@ -419,6 +491,16 @@ fn a_summary_that_contradicts_itself_is_refused() {
         }
         let error = renderer.set_scene(queue, &summary, &[]).unwrap_err();
         assert!(matches!(error, Error::CountMismatch { .. }), "{error}");
+        let mut other_kind = scene.lights.clone();
+        other_kind[0].kind = LightKind::Environment {
+            image: None,
+            rotation: 0.0,
+        };
+        let error = renderer.set_scene(queue, &summary, &other_kind).unwrap_err();
+        assert!(
+            error.to_string().contains("rectangle and environment lights"),
+            "{error}"
+        );
         let mut broken = scene;
         broken.instances[0].mesh = 99;
         assert!(matches!(SceneSummary::of(&broken), Err(Error::InvalidScene { .. })));

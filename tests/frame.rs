@@ -3,12 +3,14 @@
 
 mod common;
 
-use common::{Component, Gpu, Offline, assert_no_errors, gpu, offline};
+use common::{Component, Gpu, Offline, assert_no_errors, gpu, mean, offline};
 use lightfall::frame::{GiRenderer, SceneInputs, Settings, Stage, ViewInputs, ViewResources};
+use lightfall::glam::DVec3;
 use lightfall::pass::*;
 use lightfall::resource::*;
-use lightfall::scene::{Material, Scene, SceneSummary, samples};
+use lightfall::scene::{EnvironmentImage, Light, LightKind, Material, Scene, SceneSummary, samples};
 use lightfall::{creation_count, read_rgba32float_blocking, wgpu};
+use std::f64::consts::PI;
 
 fn small() -> Settings {
     Settings {
@@ -404,6 +406,105 @@ fn a_stage_that_is_not_needed_allocates_and_records_nothing_and_changes_no_pixel
     let unlit = passes(&unlit, &small());
     assert_eq!(unlit.0, 2);
     assert!(unlit.3.iter().flatten().all(|&v| v == 0.0));
+    assert_no_errors(&gpu);
+}
+
+/// A lamp under the ceiling of the Cornell box that shines down, and light from all around by an image of 2 × 1 texels.
+fn rectangle_and_environment(scene: &mut Scene) -> [Light; 2] {
+    scene.environments.push(EnvironmentImage {
+        name: "two halves".into(),
+        width: 2,
+        height: 1,
+        rgb: vec![[1.0; 3], [0.25, 0.5, 3.0]],
+    });
+    [
+        LightKind::Rectangle {
+            center: DVec3::new(2.78, 5.4, 2.795),
+            half_u: 0.65 * DVec3::X,
+            half_v: 0.5 * DVec3::Z,
+        },
+        LightKind::Environment {
+            image: Some(0),
+            rotation: 1.0,
+        },
+    ]
+    .map(|kind| Light {
+        kind,
+        ..Light::point(DVec3::ZERO, 7.0, [1.0; 3])
+    })
+}
+
+#[test]
+fn rectangles_and_environments_alone_leave_a_scene_black_and_the_plan_says_so() {
+    let Some(gpu) = gpu() else { return };
+    let mut scene = samples::cornell(0.0);
+    scene.lights = rectangle_and_environment(&mut scene).to_vec();
+    scene.validate().unwrap();
+    let summary = SceneSummary::of(&scene).unwrap();
+    let radius = summary.bounds.radius();
+    let mut offline = Offline::new(&gpu, scene.clone(), &small(), 0, [16, 16], Component::All).unwrap();
+    let before = creation_count().passes;
+    offline.render_frame(None).unwrap();
+    // G-buffer and composite only.
+    assert_eq!(creation_count().passes - before, 2);
+    assert!(offline.read().unwrap().iter().flatten().all(|&v| v == 0.0));
+    let plan = offline.renderer.plan().unwrap().to_string();
+    assert!(plan.contains("no point, spot or directional light"), "{plan}");
+    assert!(
+        plan.contains("rectangle and environment lights: light nothing yet (2)"),
+        "{plan}"
+    );
+    assert!(offline.renderer.shadow_maps().is_none() && offline.renderer.photons().is_none());
+    // The unit of flux is near what they emit all the same, image and all.
+    let area = 1.3 * 1.0;
+    let means = [0.625, 0.75, 2.0];
+    let lamp = 3.0 * 7.0 * PI * area;
+    let sky = 7.0 * means.iter().sum::<f64>() * 4.0 * (PI * radius).powi(2);
+    assert!((summary.total_flux / (lamp + sky) - 1.0).abs() < 1e-12);
+    let unit = offline.renderer.frame().unwrap().flux_scale();
+    assert!(unit >= summary.total_flux && unit < 2.0 * summary.total_flux);
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn rectangles_and_environments_among_other_lights_change_no_bit() {
+    let Some(gpu) = gpu() else { return };
+    let at = DVec3::new(2.78, 5.0, 2.795);
+    let spot = |outer_angle: f64, radius| LightKind::Spot {
+        position: at,
+        direction: DVec3::new(0.2, -1.0, 0.1),
+        inner_angle: 0.3,
+        outer_angle,
+        radius,
+    };
+    // One, six, one and six layers of shadow maps, with and without a penumbra.
+    let kinds = [
+        LightKind::Directional {
+            direction: DVec3::new(0.3, -1.0, 0.8),
+            angle: 0.05,
+        },
+        spot(1.4, 0.0),
+        spot(0.6, 0.2),
+        LightKind::Point {
+            position: at,
+            radius: 0.3,
+        },
+    ];
+    let mut scene = samples::cornell(0.0);
+    scene.lights = kinds
+        .map(|kind| Light {
+            kind,
+            ..Light::point(at, 10.0, [1.0, 0.8, 0.6])
+        })
+        .to_vec();
+    let render = |scene: &Scene| offline::render(&gpu, scene, &small(), [32, 32], Component::All).unwrap();
+    let reference = render(&scene);
+    assert!(mean(&reference, 32, 1, |_, _| true) > 0.0);
+    let [rectangle, environment] = rectangle_and_environment(&mut scene);
+    scene.lights.insert(2, environment);
+    scene.lights.insert(0, rectangle.clone());
+    scene.lights.push(rectangle);
+    assert!(render(&scene) == reference);
     assert_no_errors(&gpu);
 }
 

@@ -289,7 +289,7 @@ fn extras_give_lights_an_extent() {
         .map(|light| match light.kind {
             LightKind::Point { radius, .. } | LightKind::Spot { radius, .. } => radius,
             LightKind::Directional { angle, .. } => angle,
-            other => panic!("{other:?} is no light of glTF"),
+            other => panic!("not of the extension: {other:?}"),
         })
         .collect();
     assert_eq!(extents, [0.25, 0.5, 0.125, 0.0]);

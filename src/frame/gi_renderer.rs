@@ -73,7 +73,7 @@ struct SceneState {
     area: f32,
 }
 
-/// Allocated while there is a light.
+/// Allocated while there is a punctual light.
 #[derive(Debug)]
 struct DirectScene {
     lights: Lights,
@@ -211,7 +211,7 @@ impl GiRenderer {
         for (index, light) in lights.iter().enumerate() {
             light.validate(index)?;
         }
-        summary.validate(lights.len())?;
+        summary.validate(lights)?;
         let frame = match &self.state {
             Some(state) => state.frame.follow(&summary.bounds, summary.total_flux)?,
             None => UnitFrame::new(&summary.bounds, summary.total_flux)?,
@@ -609,7 +609,7 @@ impl GiRenderer {
             Some(DirectScene {
                 lights, soft: Some(_), ..
             }) => {
-                // As many layers as lights; the same shadow maps may serve other numbers of them.
+                // As many layers as punctual lights; the same shadow maps may serve other numbers of them.
                 if view.soft.as_ref().is_none_or(|s| s.0.lights() != lights.count()) {
                     let visibility = Visibility::new(device, size, lights.count())?;
                     let own = SoftShadowResources::new(device, size, lights.count())?;
@@ -654,7 +654,7 @@ impl GiRenderer {
         self.placement.coverage()
     }
 
-    /// Shadow maps, while there is a light.
+    /// Shadow maps, while there is a punctual light.
     pub fn shadow_maps(&self) -> Option<&ShadowMaps> {
         self.direct.as_ref().map(|d| &d.shadow_maps)
     }
@@ -726,12 +726,12 @@ impl ViewResources {
         &self.g_buffer
     }
 
-    /// Direct irradiance, if there is a light.
+    /// Direct irradiance, if there is a punctual light.
     pub fn direct(&self) -> Option<&Irradiance> {
         self.direct.as_ref().map(|d| &d.0)
     }
 
-    /// How much of each light is seen, if one has an extent.
+    /// How much of each punctual light is seen, if one has an extent.
     pub fn visibility(&self) -> Option<&Visibility> {
         self.soft.as_ref().map(|s| &s.0)
     }

@@ -66,12 +66,9 @@ pub struct Plan {
 impl Plan {
     /// Decides from what is in the scene and what the settings allow.
     pub fn for_scene(summary: &SceneSummary, settings: &Settings) -> Self {
-        let punctual = punctual_lights(summary);
-        let light_exists = punctual > 0;
-        let lit = if light_exists {
-            (true, format!("{punctual} light(s)"))
-        } else {
-            (false, "no light".to_owned())
+        let lit = match summary.punctual_lights() {
+            0 => (false, no_light(summary).to_owned()),
+            n => (true, format!("{n} light(s)")),
         };
         let indirect = indirect(summary, settings);
         let specular: Vec<_> = summary.metals.iter().chain(&summary.dielectrics).cloned().collect();
@@ -84,7 +81,7 @@ impl Plan {
             0 => "no light has an extent".to_owned(),
             n => format!("{n} light(s) with an extent"),
         };
-        let soft = (light_exists && summary.lights_with_extent > 0, soft);
+        let soft = (lit.0 && summary.lights_with_extent > 0, soft);
         let stage = |stage, (on, reason): (bool, String)| PlannedStage { stage, on, reason };
         let always = |reason: &str| (true, reason.to_owned());
         let nearest = match settings.soft_shadow.search {
@@ -119,15 +116,18 @@ impl Plan {
     }
 }
 
-/// Lights that the stages of a frame model.
-fn punctual_lights(summary: &SceneSummary) -> usize {
-    summary.lights.saturating_sub(summary.area_lights)
+/// Why nothing is lit where there is no punctual light.
+fn no_light(summary: &SceneSummary) -> &'static str {
+    match summary.lights {
+        0 => "no light",
+        _ => "no point, spot or directional light",
+    }
 }
 
 fn indirect(summary: &SceneSummary, settings: &Settings) -> (bool, String) {
     let off = |reason: &str| (false, reason.to_owned());
-    if punctual_lights(summary) == 0 {
-        off("no light")
+    if summary.punctual_lights() == 0 {
+        off(no_light(summary))
     } else if !summary.has_reflecting_surfaces {
         off("every surface is black")
     } else if settings.bounces == 0 {
@@ -179,10 +179,10 @@ fn simplifications(summary: &SceneSummary) -> Vec<String> {
     if !summary.dielectrics.is_empty() {
         notes.push(format!("glass, treated as Lambertian: {}", list(&summary.dielectrics)));
     }
-    if summary.area_lights > 0 {
+    if summary.lights_not_punctual > 0 {
         notes.push(format!(
-            "{} rectangle or environment light(s): light nothing",
-            summary.area_lights
+            "rectangle and environment lights: light nothing yet ({})",
+            summary.lights_not_punctual
         ));
     }
     if summary.lights_with_extent > 0 {
@@ -221,7 +221,7 @@ mod tests {
             triangles: 12,
             total_flux: 1.0,
             lights: 1,
-            area_lights: 0,
+            lights_not_punctual: 0,
             lights_with_extent: 0,
             has_reflecting_surfaces: true,
             emissive: Vec::new(),
@@ -271,6 +271,30 @@ mod tests {
         assert!(on(1, Subsampling::Half));
         assert!(!on(0, Subsampling::Half));
         assert!(!on(1, Subsampling::Full));
+    }
+
+    #[test]
+    fn lights_of_other_kinds_are_named_and_switch_no_stage_on() {
+        let settings = Settings::balanced();
+        let plan = |lights, lights_not_punctual| {
+            let summary = SceneSummary {
+                lights,
+                lights_not_punctual,
+                ..summary()
+            };
+            Plan::for_scene(&summary, &settings)
+        };
+        let (dark, one, mixed) = (plan(0, 0), plan(1, 0), plan(3, 2));
+        let on = |plan: &Plan| plan.stages.iter().map(|s| s.on).collect::<Vec<_>>();
+        assert_eq!(on(&plan(2, 2)), on(&dark));
+        assert_eq!(mixed.stages, one.stages);
+        assert!(
+            mixed
+                .to_string()
+                .contains("rectangle and environment lights: light nothing yet (2)")
+        );
+        assert!(plan(2, 2).to_string().contains("no point, spot or directional light"));
+        assert!(one.simplifications.is_empty());
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The lights of a frame as the GPU sees them, and how many photons each of them emits.
+//! The punctual lights of a frame as the GPU sees them, and how many photons each of them emits.
 
 use super::ShadowMaps;
 use super::view::axes_along;
@@ -6,7 +6,7 @@ use crate::scene::{Light, LightKind, UnitFrame};
 use crate::{Error, gpu as device};
 use glam::{DVec3, Vec3};
 
-/// Most lights a scene may have.
+/// Most punctual lights a scene may have.
 pub const MAX_LIGHTS: usize = 64;
 
 /// Share of the photon budget that is spread evenly, so that a dim lamp in a dark corner is not starved; the rest goes
@@ -49,7 +49,8 @@ pub(crate) mod gpu {
     }
 }
 
-/// All lights of a frame: an `array<Light>` of `shaders/common/light.wgsl`, intensities in the unit frame.
+/// All punctual lights of a frame ([`Light::is_punctual`]), in their order: an `array<Light>` of
+/// `shaders/common/light.wgsl`, intensities in the unit frame.
 #[derive(Debug)]
 pub struct Lights {
     buffer: wgpu::Buffer,
@@ -72,12 +73,12 @@ impl Lights {
         })
     }
 
-    /// Uploads the lights of this frame. `photon_count` photons are divided among them: three quarters in proportion to
-    /// flux, one quarter evenly among those that shine. Shadow-map layers are numbered as [`ShadowMaps`] does. Lights that
-    /// are not punctual are left out.
+    /// Uploads the punctual ones of this frame's lights. `photon_count` photons are divided among them: three quarters in
+    /// proportion to flux, one quarter evenly among those that shine. Shadow-map layers are numbered as [`ShadowMaps`]
+    /// does.
     ///
     /// # Errors
-    /// [`Error::CountMismatch`] above [`MAX_LIGHTS`].
+    /// [`Error::CountMismatch`] above [`MAX_LIGHTS`] punctual lights.
     pub fn write(
         &mut self,
         queue: &wgpu::Queue,
@@ -85,19 +86,21 @@ impl Lights {
         lights: &[Light],
         photon_count: u32,
     ) -> Result<(), Error> {
-        if lights.len() > MAX_LIGHTS {
+        let punctual = lights.iter().filter(|l| l.is_punctual()).count();
+        if punctual > MAX_LIGHTS {
             return Err(Error::CountMismatch {
-                what: "lights (most a scene may have)",
+                what: "point, spot and directional lights (most a scene may have)",
                 expected: MAX_LIGHTS,
-                found: lights.len(),
+                found: punctual,
             });
         }
-        let lights: Vec<_> = lights.iter().filter(|l| l.is_punctual()).cloned().collect();
-        let counts = divide_photons(frame, &lights, photon_count);
-        let mut records = Vec::with_capacity(lights.len());
+        let counts = divide_photons(frame, lights, photon_count);
+        let mut records = Vec::with_capacity(punctual);
         let (mut first_layer, mut first_photon) = (0, 0);
         for (light, &count) in lights.iter().zip(&counts) {
-            let record = record(frame, light, first_layer, first_photon, count);
+            let Some(record) = record(frame, light, first_layer, first_photon, count) else {
+                continue;
+            };
             first_layer += record.layer_count;
             first_photon += count;
             records.push(record);
@@ -135,11 +138,13 @@ impl Lights {
     }
 }
 
-/// Photons per light; sums to `total` if any light shines. Each light that shines gets one before the rest is divided;
-/// with fewer photons than lights the last ones get none, and their light is missing.
+/// Photons per light, none for one that is not punctual; sums to `total` if any punctual light shines. Each of them that
+/// shines gets one before the rest is divided; with fewer photons than lights the last ones get none, and their light is
+/// missing.
 fn divide_photons(frame: &UnitFrame, lights: &[Light], total: u32) -> Vec<u32> {
     let region_radius = f64::from(frame.radius()) * frame.length_scale();
-    let flux: Vec<f64> = lights.iter().map(|l| l.flux(region_radius).element_sum()).collect();
+    let flux_of = |l: &Light| l.is_punctual().then(|| l.flux(region_radius).element_sum());
+    let flux: Vec<f64> = lights.iter().map(|l| flux_of(l).unwrap_or(0.0)).collect();
     let all: f64 = flux.iter().sum();
     let shining = flux.iter().filter(|&&f| f > 0.0).count() as f64;
     let mut ones_left = total.min(shining as u32);
@@ -163,10 +168,17 @@ fn divide_photons(frame: &UnitFrame, lights: &[Light], total: u32) -> Vec<u32> {
         .collect()
 }
 
-fn record(frame: &UnitFrame, light: &Light, first_layer: u32, first_photon: u32, count: u32) -> gpu::LightRecord {
+/// `None` for a light that is not punctual.
+fn record(
+    frame: &UnitFrame,
+    light: &Light,
+    first_layer: u32,
+    first_photon: u32,
+    count: u32,
+) -> Option<gpu::LightRecord> {
     let region_radius = f64::from(frame.radius()) * frame.length_scale();
     let photon_flux = light.flux(region_radius) / f64::from(count.max(1));
-    let shape = ShadowMaps::light_shape(frame, light);
+    let shape = ShadowMaps::light_shape(frame, light)?;
     let axes = axes_along(shape.direction);
     let (mut inner, mut outer, mut kind) = (2.0, 2.0, gpu::POINT);
     let (mut position, mut intensity) = (Vec3::ZERO, frame.intensity(light.strength()));
@@ -197,9 +209,9 @@ fn record(frame: &UnitFrame, light: &Light, first_layer: u32, first_photon: u32,
             let radius = f64::from(frame.radius());
             density = 1.0 / (std::f64::consts::PI * radius * radius);
         }
-        LightKind::Rectangle { .. } | LightKind::Environment { .. } => unreachable!("only punctual lights are written"),
+        LightKind::Rectangle { .. } | LightKind::Environment { .. } => return None,
     }
-    gpu::LightRecord {
+    Some(gpu::LightRecord {
         position: position.to_array(),
         kind,
         direction: axes.forward.to_array(),
@@ -218,7 +230,7 @@ fn record(frame: &UnitFrame, light: &Light, first_layer: u32, first_photon: u32,
         disc_radius: frame.radius(),
         extent: extent.min(LARGEST_EXTENT) as f32,
         _pad: [0.0; 3],
-    }
+    })
 }
 
 /// How a light looks at the scene: along which axis, how wide, with how many layers.
@@ -250,5 +262,14 @@ mod tests {
         let counts = divide_photons(&frame(), &one_bright_among_many, 100);
         assert!(counts.iter().all(|&c| c >= 1), "{counts:?}");
         assert_eq!(counts.iter().sum::<u32>(), 100);
+        let sky = Light {
+            kind: LightKind::Environment {
+                image: None,
+                rotation: 0.0,
+            },
+            ..light(1e9)
+        };
+        let counts = divide_photons(&frame(), &[sky.clone(), light(1.0), sky, light(3.0)], 1000);
+        assert_eq!(counts, [0, 313, 0, 687]);
     }
 }

@@ -26,7 +26,7 @@ pub struct Photon {
     pub direction: u32,
     /// Reflectance of the surface, 11-11-10.
     pub reflectance: u32,
-    /// Index of the light the path began at.
+    /// Index of the light the path began at, among the punctual ones.
     pub light: u32,
 }
 

@@ -14,10 +14,10 @@ const WIDEST_SINGLE_FACE: f64 = std::f64::consts::FRAC_PI_3;
 /// Texels beyond the edge of a light's cone or region, so that no look-up falls off the map.
 const MARGIN: f64 = 1.0 / 64.0;
 
-/// Layers of one `rgba32uint` 2D array in the order of the lights: six cube faces for a point light or a wide spot, one
-/// perspective face for a spot, one parallel face over the region for a directional light. Texels as in
-/// [`EnvMaps`](super::EnvMaps); distances are from the light (parallel ones from a plane 2 unit-frame lengths before the
-/// region's centre).
+/// Layers of one `rgba32uint` 2D array in the order of the punctual lights ([`Light::is_punctual`]): six cube faces for a
+/// point light or a wide spot, one perspective face for a spot, one parallel face over the region for a directional light.
+/// Texels as in [`EnvMaps`](super::EnvMaps); distances are from the light (parallel ones from a plane 2 unit-frame lengths
+/// before the region's centre).
 #[derive(Debug)]
 pub struct ShadowMaps {
     view: wgpu::TextureView,
@@ -65,7 +65,9 @@ impl ShadowMaps {
         let (purpose, mask) = (CapturePurpose::Light, CaptureMask::CastsShadow);
         let mut views = Vec::with_capacity(self.layer_views.len());
         for light in lights {
-            let shape = Self::light_shape(frame, light);
+            let Some(shape) = Self::light_shape(frame, light) else {
+                continue;
+            };
             let axes = axes_along(shape.direction);
             match light.kind {
                 LightKind::Directional { .. } => {
@@ -86,8 +88,8 @@ impl ShadowMaps {
         views
     }
 
-    /// How a light looks at the scene.
-    pub(super) fn light_shape(frame: &UnitFrame, light: &Light) -> LightShape {
+    /// How a light looks at the scene; `None` for one that is not punctual.
+    pub(super) fn light_shape(frame: &UnitFrame, light: &Light) -> Option<LightShape> {
         let (direction, half_extent) = match light.kind {
             LightKind::Point { .. } | LightKind::Rectangle { .. } | LightKind::Environment { .. } => {
                 (DVec3::NEG_Y, 1.0)
@@ -97,12 +99,13 @@ impl ShadowMaps {
             } if outer_angle <= WIDEST_SINGLE_FACE => (direction, outer_angle.tan() * (1.0 + MARGIN)),
             LightKind::Spot { direction, .. } => (direction, 1.0),
             LightKind::Directional { direction, .. } => (direction, f64::from(frame.radius()) * (1.0 + MARGIN)),
+            LightKind::Rectangle { .. } | LightKind::Environment { .. } => return None,
         };
-        LightShape {
+        Some(LightShape {
             direction,
             half_extent: half_extent as f32,
             layers: layers_of(&light.kind),
-        }
+        })
     }
 
     /// All layers as a 2D array.

@@ -75,7 +75,7 @@ impl Scene {
         for (index, light) in self.lights.iter().enumerate() {
             light.validate(index)?;
         }
-        self.validate_environments()?;
+        self.validate_environment_lights()?;
         for (index, camera) in self.cameras.iter().enumerate() {
             camera.validate(index)?;
         }
@@ -85,12 +85,9 @@ impl Scene {
         Ok(())
     }
 
-    /// Checks images, references to them, and that there is one environment at most.
-    fn validate_environments(&self) -> Result<(), Error> {
-        for (index, image) in self.environments.iter().enumerate() {
-            image.validate(index)?;
-        }
-        let mut found = false;
+    /// There is one at most, and its image exists.
+    fn validate_environment_lights(&self) -> Result<(), Error> {
+        let mut is_second = false;
         for (index, light) in self.lights.iter().enumerate() {
             let LightKind::Environment { image, .. } = light.kind else {
                 continue;
@@ -98,16 +95,25 @@ impl Scene {
             let error = |field: &str, problem: String| {
                 Err(Error::scene("light", name_or_index(&light.name, index), field, problem))
             };
-            if let Some(image) = image.filter(|&i| i >= self.environments.len()) {
-                let count = self.environments.len();
-                return error("image", format!("is {image}, but there are {count} environments"));
+            if is_second {
+                return error("kind", "is a second environment; expected one at most".into());
             }
-            if found {
-                return error("kind", "is a second environment; a scene has one at most".into());
+            is_second = true;
+            let count = self.environments.len();
+            if let Some(image) = image.filter(|&i| i >= count) {
+                return error("image", format!("is {image}, but there are {count} environment images"));
             }
-            found = true;
         }
         Ok(())
+    }
+
+    /// [`Light::flux`], and with it the mean of the image that an environment light refers to.
+    pub fn flux_of(&self, light: &Light, region_radius: f64) -> DVec3 {
+        let image = match light.kind {
+            LightKind::Environment { image, .. } => image.and_then(|i| self.environments.get(i)),
+            _ => None,
+        };
+        light.flux(region_radius) * image.map_or(DVec3::ONE, EnvironmentImage::mean)
     }
 
     /// Triangles over all instances.

@@ -1,6 +1,6 @@
 //! What a scene holds, in the few numbers that decide which stages it needs.
 
-use super::{LightKind, Scene, SceneBounds};
+use super::{Light, Scene, SceneBounds};
 use crate::Error;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -16,10 +16,10 @@ pub struct SceneSummary {
     pub triangles: usize,
     /// Flux of all lights and emitting surfaces, W, summed over channels.
     pub total_flux: f64,
-    /// Lights without geometry, of every kind.
+    /// Lights without geometry, of all kinds.
     pub lights: usize,
-    /// Those of them that are not punctual ([`Light::is_punctual`](super::Light::is_punctual)).
-    pub area_lights: usize,
+    /// Those of them that are not punctual: rectangles and environments ([`Light::is_punctual`]).
+    pub lights_not_punctual: usize,
     /// Punctual lights with an extent, hence a penumbra.
     pub lights_with_extent: usize,
     /// Whether any surface reflects light at all.
@@ -33,11 +33,12 @@ pub struct SceneSummary {
 }
 
 impl SceneSummary {
-    /// Checks the numbers, which a host may have filled in by hand, against the number of lights given with them.
+    /// Checks the numbers, which a host may have filled in by hand, against the lights given with them.
     ///
     /// # Errors
-    /// [`Error::InvalidScene`]; [`Error::CountMismatch`] if `lights` is not `light_count`.
-    pub fn validate(&self, light_count: usize) -> Result<(), Error> {
+    /// [`Error::InvalidScene`]; [`Error::CountMismatch`] if there are not as many lights, or not as many punctual ones, as it
+    /// says.
+    pub fn validate(&self, lights: &[Light]) -> Result<(), Error> {
         let error = |field: &str, value: f64| {
             let problem = format!("is {value}; expected finite and above zero");
             Err(Error::scene("summary", "scene", field, problem))
@@ -48,18 +49,25 @@ impl SceneSummary {
         if !(self.total_flux >= 0.0 && self.total_flux.is_finite()) {
             return error("total_flux", self.total_flux);
         }
-        if self.area_lights > self.lights {
-            let problem = format!("is {}, but there are {} lights in all", self.area_lights, self.lights);
-            return Err(Error::scene("summary", "scene", "area_lights", problem));
-        }
-        if self.lights != light_count {
-            return Err(Error::CountMismatch {
-                what: "lights beside a summary that counted them",
-                expected: self.lights,
-                found: light_count,
-            });
+        let not_punctual = count_not_punctual(lights);
+        for (what, expected, found) in [
+            ("lights beside a summary that counted them", self.lights, lights.len()),
+            (
+                "rectangle and environment lights beside a summary that counted them",
+                self.lights_not_punctual,
+                not_punctual,
+            ),
+        ] {
+            if expected != found {
+                return Err(Error::CountMismatch { what, expected, found });
+            }
         }
         Ok(())
+    }
+
+    /// Lights that the image-space passes model.
+    pub fn punctual_lights(&self) -> usize {
+        self.lights.saturating_sub(self.lights_not_punctual)
     }
 
     /// Reads it off a scene.
@@ -79,11 +87,7 @@ impl SceneSummary {
             total_flux += emission.element_sum() * PI * own_area;
         }
         for light in &scene.lights {
-            let factor = match light.kind {
-                LightKind::Environment { image: Some(image), .. } => scene.environments.get(image).map(|i| i.mean()),
-                _ => None,
-            };
-            total_flux += (light.flux(bounds.radius()) * factor.unwrap_or(DVec3::ONE)).element_sum();
+            total_flux += scene.flux_of(light, bounds.radius()).element_sum();
         }
         let names = |wanted: fn(&super::Material) -> bool| {
             let in_use = scene
@@ -101,7 +105,7 @@ impl SceneSummary {
             triangles: scene.triangle_count(),
             total_flux,
             lights: scene.lights.len(),
-            area_lights: scene.lights.iter().filter(|l| !l.is_punctual()).count(),
+            lights_not_punctual: count_not_punctual(&scene.lights),
             lights_with_extent: scene
                 .lights
                 .iter()
@@ -113,6 +117,10 @@ impl SceneSummary {
             dielectrics: names(super::Material::is_transmissive),
         })
     }
+}
+
+fn count_not_punctual(lights: &[Light]) -> usize {
+    lights.iter().filter(|l| !l.is_punctual()).count()
 }
 
 fn instance_area(scene: &Scene, instance: &super::Instance) -> f64 {
