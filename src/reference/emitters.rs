@@ -307,12 +307,12 @@ impl Environment {
         let (width, height) = image.map_or((1, 1), |i| (i.width as usize, i.height as usize));
         let texel =
             |row: usize, column: usize| strength * image.map_or(Vec3::ONE, |i| Vec3::from(i.rgb[row * width + column]));
-        let edge = |row: usize| (PI * row as f64 / height as f64).cos();
+        let solid_angle = |row: usize| image.map_or(4.0 * PI, |i| i.texel_solid_angle(row as u32));
         let mut texels = Vec::with_capacity((width + 1) * height);
         let mut rows = Vec::with_capacity(height);
         for row in 0..height {
-            let solid_angle = 2.0 * PI * (edge(row) - edge(row + 1)) / width as f64;
-            let shares = running_sum((0..width).map(|column| luminance(texel(row, column)) * solid_angle));
+            let weight = |column| luminance(texel(row, column)) * solid_angle(row);
+            let shares = running_sum((0..width).map(weight));
             let all = shares.last().copied().unwrap_or_default();
             for (column, share) in shares.iter().enumerate() {
                 texels.push(texel(row, column).extend(part(*share, all)).to_array());

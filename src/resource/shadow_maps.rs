@@ -27,7 +27,7 @@ pub struct ShadowMaps {
 }
 
 impl ShadowMaps {
-    /// Layers that these lights need: none for those that are not punctual.
+    /// Layers that these lights need.
     pub fn layers(lights: &[Light]) -> u32 {
         lights.iter().map(|l| layers_of(&l.kind)).sum()
     }
@@ -91,9 +91,7 @@ impl ShadowMaps {
     /// How a light looks at the scene; `None` for one that is not punctual.
     pub(super) fn light_shape(frame: &UnitFrame, light: &Light) -> Option<LightShape> {
         let (direction, half_extent) = match light.kind {
-            LightKind::Point { .. } | LightKind::Rectangle { .. } | LightKind::Environment { .. } => {
-                (DVec3::NEG_Y, 1.0)
-            }
+            LightKind::Point { .. } => (DVec3::NEG_Y, 1.0),
             LightKind::Spot {
                 direction, outer_angle, ..
             } if outer_angle <= WIDEST_SINGLE_FACE => (direction, outer_angle.tan() * (1.0 + MARGIN)),

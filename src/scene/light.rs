@@ -131,11 +131,6 @@ impl Light {
         }
     }
 
-    /// Whether it is a point, spot or directional light: what shadow maps and photons start from.
-    pub fn is_punctual(&self) -> bool {
-        !matches!(self.kind, LightKind::Rectangle { .. } | LightKind::Environment { .. })
-    }
-
     /// Whether the light has an extent, and so a penumbra.
     pub fn has_extent(&self) -> bool {
         match self.kind {

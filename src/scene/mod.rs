@@ -44,8 +44,6 @@ pub struct Scene {
     pub instances: Vec<Instance>,
     /// Light sources without geometry. Emissive materials shine by themselves.
     pub lights: Vec<Light>,
-    /// Images that environment lights refer to.
-    pub environments: Vec<EnvironmentImage>,
     /// View points.
     pub cameras: Vec<Camera>,
 }

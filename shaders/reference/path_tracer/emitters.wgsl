@@ -207,10 +207,10 @@ fn emitter_sample_triangle(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
     return EmitterSample(e.strength * texel, pdf, direction, false, bvh_offset(position, normal), true);
 }
 
-// Unit direction to coordinates of an equirectangular image: -z in its middle, +y at its top.
+// Twin of `EnvironmentImage::uv_of`.
 fn environment_uv(direction: vec3f) -> vec2f {
     let turn = (params.environment_rotation + atan2(direction.x, -direction.z)) / (2.0 * EMITTER_PI) + 0.5;
-    return vec2f(turn - floor(turn), acos(clamp(direction.y, -1.0, 1.0)) / EMITTER_PI);
+    return vec2f(turn - floor(turn), atan2(length(direction.xz), direction.y) / EMITTER_PI);
 }
 
 fn environment_radiance(direction: vec3f) -> vec3f {
