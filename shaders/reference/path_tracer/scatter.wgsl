@@ -34,6 +34,8 @@ struct Scattering {
     weight: vec3f,
     // Per solid angle; 0 where the direction is the only one
     pdf: f32,
+    // Square of the index of refraction over there over that over here
+    squeeze: f32,
 }
 
 fn scatter_at(surface: BvhSurface, direction: vec3f) -> Scatterer {
@@ -66,13 +68,13 @@ fn scatter_sample(s: Scatterer, outgoing: vec3f, random: vec4f) -> Scattering {
     let o = outgoing * s.frame;
     var local: Scattering;
     switch s.kind {
-        case SCATTER_MIRROR: { local = Scattering(vec3f(-o.xy, o.z), s.color, 0.0); }
+        case SCATTER_MIRROR: { local = Scattering(vec3f(-o.xy, o.z), s.color, 0.0, 1.0); }
         case SCATTER_METAL: { local = scatter_sample_metal(s, o, random); }
         case SCATTER_GLASS: { local = scatter_sample_glass(s, o, vec3f(0.0, 0.0, 1.0), random.z); }
         case SCATTER_ROUGH_GLASS: { local = scatter_sample_rough_glass(s, o, random); }
         default: {
             let i = sampling_cosine(random.xy);
-            local = Scattering(i, s.color, i.z / SCATTER_PI);
+            local = Scattering(i, s.color, i.z / SCATTER_PI, 1.0);
         }
     }
     local.direction = normalize(s.frame * local.direction);
@@ -106,10 +108,10 @@ fn scatter_sample_metal(s: Scatterer, o: vec3f, random: vec4f) -> Scattering {
     let h = ggx_sample_seen(o, s.alpha, random.xy);
     let i = reflect(-o, h);
     if i.z <= 0.0 || o.z <= 0.0 {
-        return Scattering(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 1.0);
+        return Scattering(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 1.0, 1.0);
     }
     let pdf = ggx_seen_density(o, h, s.alpha) / (4.0 * max(dot(o, h), 1e-20));
-    return Scattering(i, s.color * ggx_lit_share(i, s.alpha), pdf);
+    return Scattering(i, s.color * ggx_lit_share(i, s.alpha), pdf, 1.0);
 }
 
 // Reflects or refracts about a normal by chance. Radiance that enters a denser medium is squeezed into a narrower cone,
@@ -118,10 +120,10 @@ fn scatter_sample_glass(s: Scatterer, o: vec3f, h: vec3f, chance: f32) -> Scatte
     let cosine = dot(o, h);
     let fresnel = fresnel_dielectric(cosine, s.eta);
     if chance < fresnel.x {
-        return Scattering(reflect(-o, h), vec3f(1.0), 0.0);
+        return Scattering(reflect(-o, h), vec3f(1.0), 0.0, 1.0);
     }
     let i = (cosine / s.eta - fresnel.y) * h - o / s.eta;
-    return Scattering(i, s.color / (s.eta * s.eta), 0.0);
+    return Scattering(i, s.color / (s.eta * s.eta), 0.0, s.eta * s.eta);
 }
 
 fn scatter_sample_rough_glass(s: Scatterer, o: vec3f, random: vec4f) -> Scattering {
@@ -131,7 +133,7 @@ fn scatter_sample_rough_glass(s: Scatterer, o: vec3f, random: vec4f) -> Scatteri
     // A direction on the wrong side of the surface is one that the neighbouring facets would block.
     let is_blocked = transmits != (dot(sample.direction, h) < 0.0);
     if is_blocked || o.z <= 0.0 || sample.direction.z == 0.0 {
-        return Scattering(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 1.0);
+        return Scattering(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 1.0, 1.0);
     }
     sample.weight *= ggx_lit_share(sample.direction, s.alpha);
     sample.pdf = scatter_evaluate_rough_glass(s, o, sample.direction).w;

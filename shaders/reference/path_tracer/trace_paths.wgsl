@@ -41,14 +41,13 @@ const COMPONENT_INDIRECT: u32 = 2u;
 const COMPONENT_CAUSTIC: u32 = 3u;
 const COMPONENT_SPECULAR: u32 = 4u;
 
-// No path survives roulette with more than this.
-const PATH_SURVIVAL: f32 = 0.95;
-
 // A path so far.
 struct Path {
     origin: vec3f,
     direction: vec3f,
     throughput: vec3f,
+    // Square of the index of refraction of the medium that it is in: what radiance there is squeezed by
+    squeeze: f32,
     radiance: vec3f,
     // Of the direction that the last surface sampled, per solid angle; 0 where no light can be sampled that way
     pdf: f32,
@@ -173,7 +172,7 @@ fn path_begin(pixel: vec2u, u: vec2f) -> Path {
         origin += across;
         direction = params.forward;
     }
-    return Path(origin, normalize(direction), vec3f(1.0), vec3f(0.0), 0.0, 0u, false, true);
+    return Path(origin, normalize(direction), vec3f(1.0), 1.0, vec3f(0.0), 0.0, 0u, false, true);
 }
 
 fn path_trace(pixel: vec2u) -> vec3f {
@@ -205,8 +204,11 @@ fn path_trace(pixel: vec2u) -> vec3f {
         }
         let next = scatter_sample(scatterer, -path.direction, path_random(&random));
         path.throughput *= next.weight;
+        path.squeeze *= next.squeeze;
         path.scatterings++;
-        let survival = min(PATH_SURVIVAL, max(path.throughput.x, max(path.throughput.y, path.throughput.z)));
+        // What light will be worth once it has left the glass that it is in.
+        let worth = path.squeeze * path.throughput;
+        let survival = min(1.0, max(worth.x, max(worth.y, worth.z)));
         if survival <= 0.0 {
             break;
         }
