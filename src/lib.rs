@@ -16,7 +16,7 @@
 //! | [`resource`] | what crosses a seam between passes: textures and buffers of documented format; the host's draws as a [`Geometry`](resource::Geometry) |
 //! | [`pass`] | one technique each, recorded into the host's encoder |
 //! | [`frame`] | everything composed: [`Settings`](frame::Settings), [`Plan`](frame::Plan), [`GiRenderer`](frame::GiRenderer) |
-//! | [`mod@reference`] | beside the layers: what accuracy is measured with |
+//! | [`mod@reference`] | beside the layers: what accuracy is measured with, a path tracer and error metrics |
 //!
 //! A pass knows the resources at its seams and no other pass. A host may use [`GiRenderer`](frame::GiRenderer), or single
 //! passes with resources of its own.
@@ -95,10 +95,12 @@
 //!
 //! # Features
 //!
-//! Both are on by default. Without them there are the passes and what they need.
+//! All are on by default. Without them there are the passes that need no triangles.
 //!
+//! - `bvh`: rays against triangles, [`resource::BvhGeometry`] and [`pass::BvhTracer`].
 //! - `samples`: procedural test scenes, [`scene::samples`].
-//! - `reference`: error metrics, [`reference::metrics`].
+//! - `reference`: error metrics, [`reference::metrics`], and with `bvh` the renderer that is right,
+//!   [`reference::PathTracer`].
 //!
 //! The crate enables no backend of wgpu: the host does.
 //!
