@@ -349,6 +349,8 @@ impl Rows {
 
 /// Renders an image, puts it into a file, and returns its row, without figures yet.
 fn rendered(gpu: &Gpu, job: &Job<'_>, path: &Path, bar: &ProgressBar) -> Result<Value, String> {
+    // What a row that failed has left is not this one's.
+    gpu.take_errors();
     let scene = gltf_scene::load(&job.reference.scene_path, 0.0)?;
     if scene.cameras.is_empty() {
         return Err(format!("{}: has no camera", job.reference.scene_path.display()));

@@ -381,6 +381,9 @@ fn accuracy_renders_a_row_once_unless_told_otherwise() {
 
     let (fresh, image_time) = run(&["--presets", "fast", "--fresh"]);
     assert!(fresh.len() == 3 && image_time > first.1);
+    // A scene that may not be shown is measured, and on the sheet there is but the legend.
+    assert_eq!(run(&["--presets", "fast", "--unpictured", "plane"]).0, fresh);
+    assert_eq!(image::image_dimensions(folder.join("accuracy.png")).unwrap().1, 16);
     // An image that is lost is rendered again.
     std::fs::remove_file(folder.join("out/plane.direct.fast.bounces3.exr")).unwrap();
     assert!(run(&["--presets", "fast"]).1 > image_time);
