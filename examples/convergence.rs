@@ -13,7 +13,7 @@ mod common;
 
 use clap::Parser;
 use common::adapter::{Gpu, Wishes};
-use common::reference::Reference;
+use common::reference::{Reference, own_noise};
 use common::{arguments, gltf_scene, progress, truth_file};
 use lightfall::reference::metrics::{self, Image, Truth};
 use lightfall::reference::{PathComponent, PathEstimate, PathTracerSettings};
@@ -134,43 +134,6 @@ fn row(name: &str, samples: u32, estimate: &PathEstimate, (truth, seconds): (&Tr
         100.0 * noise.of_mean,
     );
     Ok(comparison.relmse)
-}
-
-struct Noise {
-    /// What relMSE would be if all of the error were noise.
-    relative_variance: f64,
-    /// Standard error of the energy bias, the reference's own included.
-    of_mean: f64,
-}
-
-/// What the path tracer expects its own noise to add, over the pixels that are compared.
-fn own_noise(estimate: &PathEstimate, truth: &Truth) -> Noise {
-    let compared: Vec<usize> = (0..truth.image.rgb.len()).filter(|&p| truth.is_compared(p)).collect();
-    let count = 3.0 * compared.len() as f64;
-    let values = || compared.iter().flat_map(|&p| truth.image.rgb[p]).map(f64::from);
-    let mean = values().sum::<f64>() / count;
-    let variances = || {
-        compared
-            .iter()
-            .flat_map(|&p| estimate.standard_error[p])
-            .map(|e| f64::from(e).powi(2))
-    };
-    let relative = values()
-        .zip(variances())
-        .map(|(r, v)| v / (r * r + (0.01 * mean).powi(2)));
-    let of_truth: f64 = truth.standard_error.as_ref().map_or(0.0, |errors| {
-        compared
-            .iter()
-            .flat_map(|&p| errors[p])
-            .map(|e| f64::from(e).powi(2))
-            .sum()
-    });
-    // Channels of a pixel rise and fall together: their errors add up, not their squares.
-    let of_sum = 3.0 * (variances().sum::<f64>() + of_truth);
-    Noise {
-        relative_variance: relative.sum::<f64>() / count,
-        of_mean: of_sum.sqrt() / (count * mean),
-    }
 }
 
 /// Least squares through (x, y).

@@ -194,6 +194,7 @@ pub(crate) enum Slot {
     /// `texture_2d_array<f32>`, read by `textureLoad` only.
     TextureArray,
     /// `texture_2d_array<f32>` for filtering.
+    #[cfg(feature = "bvh")]
     FilteredTextureArray,
     /// `texture_2d_array<u32>`.
     UintArray,
@@ -235,6 +236,7 @@ pub(crate) fn layout(
                 Slot::FilteredTexture => texture(wgpu::TextureSampleType::Float { filterable: true }, flat),
                 Slot::UintTexture => texture(wgpu::TextureSampleType::Uint, flat),
                 Slot::TextureArray => texture(wgpu::TextureSampleType::Float { filterable: false }, array),
+                #[cfg(feature = "bvh")]
                 Slot::FilteredTextureArray => texture(wgpu::TextureSampleType::Float { filterable: true }, array),
                 Slot::UintArray => texture(wgpu::TextureSampleType::Uint, array),
                 Slot::StorageTexture(format) => wgpu::BindingType::StorageTexture {
@@ -277,6 +279,7 @@ pub(crate) fn bind_group(
 pub(crate) enum Bound {
     View(wgpu::TextureView),
     Buffer(wgpu::Buffer),
+    #[cfg(feature = "bvh")]
     Sampler(wgpu::Sampler),
 }
 
@@ -292,6 +295,7 @@ impl From<&wgpu::Buffer> for Bound {
     }
 }
 
+#[cfg(feature = "bvh")]
 impl From<&wgpu::Sampler> for Bound {
     fn from(sampler: &wgpu::Sampler) -> Self {
         Self::Sampler(sampler.clone())
@@ -339,6 +343,7 @@ impl BindGroupCache {
             .map(|b| match b {
                 Bound::View(view) => wgpu::BindingResource::TextureView(view),
                 Bound::Buffer(buffer) => buffer.as_entire_binding(),
+                #[cfg(feature = "bvh")]
                 Bound::Sampler(sampler) => wgpu::BindingResource::Sampler(sampler),
             })
             .collect();

@@ -432,6 +432,7 @@ fn kind_of_slot(slot: Slot) -> String {
         Slot::Texture | Slot::FilteredTexture => "texture_2d<f32>".into(),
         Slot::UintTexture => "texture_2d<u32>".into(),
         Slot::TextureArray => "texture_2d_array<f32>".into(),
+        #[cfg(feature = "bvh")]
         Slot::FilteredTextureArray => "texture_2d_array<f32>".into(),
         Slot::UintArray => "texture_2d_array<u32>".into(),
         Slot::StorageTexture(format) => format!("texture_storage_2d<{format:?}, write>"),

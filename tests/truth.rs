@@ -155,3 +155,76 @@ fn a_colonnade_under_the_sun_is_as_near_to_the_truth_as_it_was() -> Result<(), S
         ],
     )
 }
+
+/// The path tracer has no margin to be given: all of its error must be noise of the size that it says itself.
+#[cfg(feature = "bvh")]
+#[test]
+fn the_path_tracer_differs_from_the_truth_by_its_own_noise_alone() -> Result<(), String> {
+    use lightfall::reference::{PathComponent, PathTracerSettings};
+    const SAMPLES: u32 = 32;
+    /// Standard errors that an energy bias may amount to: by chance once in 16 000 images.
+    const MOST_SIGMA: f64 = 4.0;
+    let images = [
+        ("cornell_point", PathComponent::Direct),
+        ("cornell_point", PathComponent::Indirect),
+        ("cornell_spot", PathComponent::Direct),
+        ("cornell_spot", PathComponent::Indirect),
+        ("cornell_area", PathComponent::Direct),
+        ("cornell_area", PathComponent::Indirect),
+        ("cornell_glossy", PathComponent::All),
+        ("sponza_dabrovic", PathComponent::Direct),
+        ("sponza_dabrovic", PathComponent::Indirect),
+    ];
+    let mut exceeded = Vec::new();
+    for (scene, component) in images {
+        let part = format!("{component:?}").to_lowercase();
+        let scene_path = shared(&format!("scenes/{scene}.glb"));
+        let truth_path = shared(&format!("truth/{scene}.{part}.exr"));
+        if !(scene_path.exists() && truth_path.exists()) {
+            println!("skipped: there is no {}", truth_path.display());
+            continue;
+        }
+        let Some(gpu) = common::gpu() else {
+            return Ok(());
+        };
+        let truth = truth_file::read_truth(&truth_path)?
+            .downsampled(REDUCTION)
+            .map_err(|error| error.to_string())?;
+        let settings = PathTracerSettings {
+            component,
+            bounces: BOUNCES,
+            ..Default::default()
+        };
+        let loaded = gltf_scene::load(&scene_path, 0.0)?;
+        let size = [truth.image.width, truth.image.height];
+        let mut reference =
+            common::Reference::new(&gpu, loaded, &settings, 0, size).map_err(|error| error.to_string())?;
+        for _ in 0..SAMPLES {
+            reference.render_sample(None).map_err(|error| error.to_string())?;
+        }
+        common::assert_no_errors(&gpu);
+        let estimate = reference.read().map_err(|error| error.to_string())?;
+        let noise = common::reference::own_noise(&estimate, &truth);
+        let image = Image {
+            width: size[0],
+            height: size[1],
+            rgb: estimate.mean,
+        };
+        let found = compare(&image, &truth).map_err(|error| error.to_string())?;
+        // Not relMSE, which a single pixel on the edge of a black shadow may decide.
+        let share = found.rmse * found.rmse / noise.variance;
+        let line = format!(
+            "{scene} {part}: relMSE {:.5} (noise: {:.5}), squared error over noise {share:.3}, energy bias {:+.5} ± {:.5}",
+            found.relmse, noise.relative_variance, found.bias, noise.of_mean
+        );
+        println!("{line}");
+        if !(share <= MARGIN && found.bias.abs() <= MOST_SIGMA * noise.of_mean) {
+            exceeded.push(line);
+        }
+    }
+    if exceeded.is_empty() {
+        Ok(())
+    } else {
+        Err(exceeded.join("\n"))
+    }
+}

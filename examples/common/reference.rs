@@ -1,6 +1,7 @@
 //! Renders a scene by path tracing: the same camera and components as `offline`, without its approximations.
 
 use super::adapter::Gpu;
+use lightfall::reference::metrics::Truth;
 use lightfall::reference::{
     Emitters, PathEstimate, PathTracer, PathTracerInputs, PathTracerResources, PathTracerSettings,
 };
@@ -104,5 +105,47 @@ impl<'a> Reference<'a> {
             ("Emitters", self.emitters.memory_use()),
             ("PathTracer", self.resources.memory_use()),
         ]
+    }
+}
+
+/// What of a difference from a reference image is noise.
+pub(crate) struct Noise {
+    /// What relMSE would be if all of the error were noise.
+    pub(crate) relative_variance: f64,
+    /// What the squared RMSE would be, the reference's own noise included.
+    pub(crate) variance: f64,
+    /// Standard error of the energy bias, the reference's own included.
+    pub(crate) of_mean: f64,
+}
+
+/// What the path tracer expects its own noise to add, over the pixels that are compared.
+pub(crate) fn own_noise(estimate: &PathEstimate, truth: &Truth) -> Noise {
+    let compared: Vec<usize> = (0..truth.image.rgb.len()).filter(|&p| truth.is_compared(p)).collect();
+    let count = 3.0 * compared.len() as f64;
+    let values = || compared.iter().flat_map(|&p| truth.image.rgb[p]).map(f64::from);
+    let mean = values().sum::<f64>() / count;
+    let variances = || {
+        compared
+            .iter()
+            .flat_map(|&p| estimate.standard_error[p])
+            .map(|e| f64::from(e).powi(2))
+    };
+    let relative = values()
+        .zip(variances())
+        .map(|(r, v)| v / (r * r + (0.01 * mean).powi(2)));
+    let of_truth: f64 = truth.standard_error.as_ref().map_or(0.0, |errors| {
+        compared
+            .iter()
+            .flat_map(|&p| errors[p])
+            .map(|e| f64::from(e).powi(2))
+            .sum()
+    });
+    let sum = variances().sum::<f64>() + of_truth;
+    // Channels of a pixel rise and fall together: their errors add up, not their squares.
+    let of_sum = 3.0 * sum;
+    Noise {
+        variance: sum / count,
+        relative_variance: relative.sum::<f64>() / count,
+        of_mean: of_sum.sqrt() / (count * mean),
     }
 }

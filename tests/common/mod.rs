@@ -9,7 +9,7 @@ pub(crate) mod statistics;
 pub(crate) use examples::adapter::{Gpu, Wishes};
 pub(crate) use examples::offline::{self, Component, Offline};
 #[cfg(all(feature = "bvh", feature = "reference"))]
-pub(crate) use examples::reference::Reference;
+pub(crate) use examples::reference::{self, Reference};
 pub(crate) use examples::{exr_file, gltf_scene, truth_file};
 
 /// A device, or `None` with a printed reason where the machine has no usable adapter; a failure where
