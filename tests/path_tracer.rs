@@ -543,3 +543,47 @@ fn doubling_all_lengths_and_powers_changes_no_bit_of_the_rescaled_image() {
         }
     }
 }
+
+#[test]
+fn what_a_mirror_throws_onto_the_floor_is_the_caustic_and_what_it_hides_is_missing_from_the_direct_light() {
+    let Some(gpu) = gpu() else { return };
+    let half_view = 0.8;
+    let (middle, u, v) = (
+        DVec3::new(0.1, 0.6, -0.9),
+        DVec3::new(0.7, 0.0, 0.0),
+        DVec3::new(0.0, 0.5, 0.0),
+    );
+    let corners = [-u - v, u - v, u + v, v - u].map(|c| middle + c);
+    let mut scene = floor(2.0, 0.6, half_view);
+    scene.meshes.push(Mesh {
+        name: "mirror".into(),
+        positions: corners.map(|c| c.as_vec3().to_array()).to_vec(),
+        indices: vec![0, 1, 2, 0, 2, 3],
+        ..Mesh::default()
+    });
+    scene.materials.push(Material {
+        base_color: [0.8; 3],
+        metallic: 1.0,
+        roughness: 0.0,
+        ..Material::default()
+    });
+    scene.instances.push(Instance::new(1, 1));
+    scene.lights.push(Light {
+        color: [1.0; 3],
+        ..environment(None, 0.0)
+    });
+    // The mirror shows the sky, whose radiance is 2, from wherever the floor sees it.
+    let mirrored = expected_mean(0.6, half_view, |p| 2.0 * polygon_irradiance(p, &corners));
+    let unhidden = 0.6 * 2.0 - mirrored;
+    for (part, expected, name) in [
+        (PathComponent::Caustic, 0.8 * mirrored, "caustic"),
+        (PathComponent::Direct, unhidden, "direct"),
+        (PathComponent::Indirect, 0.8 * mirrored, "indirect"),
+        (PathComponent::All, unhidden + 0.8 * mirrored, "all"),
+    ] {
+        let estimate = render(&gpu, &scene, &component(part, 1), [64, 64], 256);
+        let error = mean(&estimate) / expected - 1.0;
+        println!("mirror beside a floor, {name}: {:+.3} %", 100.0 * error);
+        assert!(error.abs() < 0.005, "{name}: {error}");
+    }
+}
