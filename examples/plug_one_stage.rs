@@ -313,6 +313,7 @@ impl Walk {
             queue: &engine.queue,
             env_maps: &self.env_maps,
             photons,
+            shared: None,
             sample_offset: 0,
             settings: &ImageSpaceTracerSettings::default(),
             timestamps: None,

@@ -8,7 +8,7 @@ use crate::pass::{
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
-use crate::resource::{Photon, PhotonState, g_buffer, lights, mesh_geometry, view};
+use crate::resource::{Photon, PhotonState, g_buffer, lights, lost_rays, mesh_geometry, view};
 use crate::wgsl;
 #[cfg(feature = "bvh")]
 use crate::{
@@ -238,12 +238,13 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::IMAGE_SPACE_TRACER, "WalkParams", photon_walk::gpu::WalkParams {
             photon_count, first_hop, last_hop, roulette_from, sample_offset, row,
         }),
+        twin!(wgsl::IMAGE_SPACE_TRACER_LIST, "LostRays", lost_rays::gpu::LostRays { workgroups, count, paths }),
         #[cfg(feature = "bvh")]
-        twin!(wgsl::BVH_TRACER, "Params", bvh_tracer::gpu::Params { ray_count, row }),
+        twin!(wgsl::BVH_TRACER_RAYS, "Params", bvh_tracer::gpu::Params { ray_count, row }),
         #[cfg(feature = "bvh")]
-        twin!(wgsl::BVH_TRACER, "Ray", Ray { origin, furthest, direction, mask }),
+        twin!(wgsl::BVH_TRACER_RAYS, "Ray", Ray { origin, furthest, direction, mask }),
         #[cfg(feature = "bvh")]
-        twin!(wgsl::BVH_TRACER, "RayHit", RayHit {
+        twin!(wgsl::BVH_TRACER_RAYS, "RayHit", RayHit {
             distance, instance, triangle, is_front, barycentric, nodes_visited, triangles_visited,
         }),
         #[cfg(feature = "bvh")]
@@ -399,8 +400,11 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "MeshGeometry" => vec![&mesh_geometry::SCENE_SLOTS, &mesh_geometry::MATERIAL_SLOTS],
         "PhotonEmitter" => vec![&photon_emitter::SLOTS],
         "ImageSpaceTracer" => vec![&photon_walk::SLOTS, &image_space_tracer::SLOTS],
+        "ImageSpaceTracer list" => vec![&image_space_tracer::LIST_SLOTS],
         #[cfg(feature = "bvh")]
-        "BvhTracer" => vec![&bvh_tracer::SLOTS, &bvh_geometry::BVH_SLOTS],
+        "BvhTracer" => vec![&photon_walk::SLOTS, &bvh_geometry::BVH_SLOTS, &bvh_tracer::LOST_SLOTS],
+        #[cfg(feature = "bvh")]
+        "BvhTracer rays" => vec![&bvh_tracer::RAY_SLOTS, &bvh_geometry::BVH_SLOTS],
         "PhotonSplatter tiled" => vec![&photon_splatter::TILED_SLOTS],
         "PhotonSplatter quads" => vec![&photon_splatter::QUAD_SLOTS],
         "DirectLight" => vec![&direct_light::SLOTS, &direct_light::VISIBILITY_SLOTS],
@@ -612,11 +616,18 @@ fn photon_states_are_the_same_on_both_sides() {
         assert_eq!((first_hit.state(), first_hit.is_first_hit()), (state, true), "{name}");
     }
     assert_eq!(shader.constant("PHOTON_FIRST_HIT"), Literal::U32(Photon::FIRST_HIT));
+    assert_eq!(shader.constant("PHOTON_TENTATIVE"), Literal::U32(Photon::TENTATIVE));
     let Literal::U32(mask) = shader.constant("PHOTON_STATE_MASK") else {
         panic!("PHOTON_STATE_MASK is not a u32");
     };
     assert_eq!(photon(!mask).state(), PhotonState::Empty);
     assert_eq!(photon(mask).state() as u32, mask);
+}
+
+#[test]
+fn blocks_of_lost_rays_are_the_same_on_both_sides() {
+    let shader = Shader::new("ImageSpaceTracer list", wgsl::IMAGE_SPACE_TRACER_LIST);
+    assert_eq!(shader.constant("BLOCK"), Literal::U32(lost_rays::BLOCK));
 }
 
 #[test]

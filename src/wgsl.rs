@@ -61,8 +61,36 @@ pub(crate) const IMAGE_SPACE_TRACER: &str = compose![
     "common/hash.wgsl",
 ];
 
+pub(crate) const IMAGE_SPACE_TRACER_LIST: &str = compose![
+    "pass/image_space_tracer/list_lost.wgsl",
+    "pass/photon_walk/params.wgsl",
+    "common/lost_rays.wgsl",
+    "common/photon.wgsl",
+    "common/octahedral.wgsl",
+];
+
 #[cfg(feature = "bvh")]
 pub(crate) const BVH_TRACER: &str = compose![
+    "pass/bvh_tracer/trace_ray.wgsl",
+    "pass/bvh_tracer/walk_lost.wgsl",
+    "pass/bvh_tracer/bindings.wgsl",
+    "pass/photon_walk/walk_photons.wgsl",
+    "pass/photon_walk/params.wgsl",
+    "common/bvh.wgsl",
+    "common/bvh_surface.wgsl",
+    "common/hit.wgsl",
+    "common/lost_rays.wgsl",
+    "common/photon.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/sampling.wgsl",
+    "common/random.wgsl",
+    "common/halton.wgsl",
+    "common/hash.wgsl",
+];
+
+#[cfg(feature = "bvh")]
+pub(crate) const BVH_TRACER_RAYS: &str = compose![
     "pass/bvh_tracer/trace_rays.wgsl",
     "pass/bvh_tracer/bindings.wgsl",
     "common/bvh.wgsl",
@@ -210,8 +238,11 @@ pub const MODULES: &[(&str, &str)] = &[
     ("MeshGeometry", MESH_GEOMETRY),
     ("PhotonEmitter", PHOTON_EMITTER),
     ("ImageSpaceTracer", IMAGE_SPACE_TRACER),
+    ("ImageSpaceTracer list", IMAGE_SPACE_TRACER_LIST),
     #[cfg(feature = "bvh")]
     ("BvhTracer", BVH_TRACER),
+    #[cfg(feature = "bvh")]
+    ("BvhTracer rays", BVH_TRACER_RAYS),
     ("PhotonSplatter tiled", PHOTON_SPLATTER_TILED),
     ("PhotonSplatter quads", PHOTON_SPLATTER_QUADS),
     ("Upsampler", UPSAMPLER),
@@ -235,6 +266,8 @@ pub const MODULES: &[(&str, &str)] = &[
 /// Functions of `shaders/common/` that tests compare with `f64` twins.
 #[doc(hidden)]
 pub const COMMON: &str = compose![
+    "common/lost_rays.wgsl",
+    "common/photon.wgsl",
     "common/subsampling.wgsl",
     "common/octahedral.wgsl",
     "common/reflectance.wgsl",

@@ -6,7 +6,7 @@ mod common;
 use common::statistics::Random;
 use common::{Gpu, assert_no_errors, gpu};
 use lightfall::glam::{DVec3, Vec3};
-use lightfall::pass::{BvhTracer, BvhTracerInputs, BvhTracerResources, RayQuery};
+use lightfall::pass::{BvhTracer, BvhTracerRayInputs, BvhTracerResources, RayQuery};
 use lightfall::resource::{BvhGeometry, BvhGeometryConfig, Ray, RayHit, Rays};
 use lightfall::scene::{Scene, UnitFrame, samples};
 
@@ -17,14 +17,14 @@ fn trace(gpu: &Gpu, geometry: &BvhGeometry, query: RayQuery, rays: &[Ray]) -> Ve
     let tracer = BvhTracer::new(&gpu.device);
     let mut resources = BvhTracerResources::new(&gpu.device).unwrap();
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    let inputs = BvhTracerInputs {
+    let inputs = BvhTracerRayInputs {
         queue: &gpu.queue,
         geometry,
         rays: &list,
         query,
         timestamps: None,
     };
-    tracer.record(&mut encoder, &mut resources, &inputs);
+    tracer.record_rays(&mut encoder, &mut resources, &inputs);
     gpu.queue.submit([encoder.finish()]);
     lightfall::read_buffer_blocking(&gpu.device, &gpu.queue, list.hits()).unwrap()
 }

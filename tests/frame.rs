@@ -225,6 +225,7 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
         queue,
         env_maps: &env_maps,
         photons: &photons,
+        shared: None,
         sample_offset: 0,
         settings: &settings.tracer,
         timestamps,

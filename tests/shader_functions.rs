@@ -6,6 +6,7 @@ use common::evaluate::run;
 use common::statistics::{Random, chi_square, chi_square_2d, gamma_tail};
 use common::{Gpu, gpu};
 use lightfall::glam::{DMat3, DVec2, DVec3, Vec3};
+use lightfall::resource::Photon;
 use lightfall::resource::cube_face::{CUBE_FACES, CubeFace};
 use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
@@ -929,4 +930,48 @@ fn chi_square_sees_a_wrong_azimuth_too() {
     assert!(chi_square_2d(&points, |_| 1.0, |_| 1.0) > LEAST_P);
     assert!(chi_square_2d(&points, |_| 1.0, |y| 1.0 + 0.05 * (TAU * y).cos()) < LEAST_P);
     assert!(chi_square_2d(&points, |x| 1.0 + 0.1 * (x - 0.5), |_| 1.0) < LEAST_P);
+}
+
+#[test]
+fn workgroups_for_lost_rays_hold_all_of_them_within_the_limit() {
+    let Some(gpu) = gpu() else { return };
+    const MOST: u32 = 65_535;
+    let borders = [1, 2, 3, 64, 1024].map(|rows| rows * MOST).map(|groups| groups * 64);
+    let mut random = Random(11);
+    let counts: Vec<[u32; 4]> = borders
+        .into_iter()
+        .flat_map(|count| [count - 64, count - 1, count, count + 1, count + 65])
+        .chain([0, 1, 63, 64, 65, u32::MAX])
+        .chain((0..1000).map(|_| random.bits() >> (random.bits() % 32)))
+        .map(|count| [count; 4])
+        .collect();
+    let body = "
+        let groups = lost_rays_workgroups(input.x);
+        return vec4f(f32(groups[0]), f32(groups[1]), f32(groups[2]), 0.0);";
+    for ([count, ..], groups) in counts.iter().zip(run(&gpu, body, &counts)) {
+        let [x, y, z, _] = groups.map(|v| v as u32);
+        assert!(x <= MOST && y <= MOST && z == 1, "{count}: {x} {y} {z}");
+        let (needed, held) = (count.div_ceil(64), u64::from(x) * u64::from(y));
+        assert!(held >= u64::from(needed), "{count}: {x} {y}");
+        // No row is empty, and none is longer than it must be.
+        assert!(held < u64::from(needed) + u64::from(y), "{count}: {x} {y}");
+        if needed <= MOST {
+            assert_eq!([x, y], [needed, 1], "{count}");
+        }
+    }
+}
+
+#[test]
+fn hops_to_walk_again_are_those_that_are_lost_or_tentative() {
+    let Some(gpu) = gpu() else { return };
+    let states: Vec<[u32; 4]> = (0..1024).map(|state| [state; 4]).collect();
+    let body = "return vec4f(f32(photon_is_unresolved(input.x)));";
+    for ([state, ..], [found, ..]) in states.iter().zip(run(&gpu, body, &states)) {
+        let photon = Photon {
+            state: *state,
+            ..bytemuck::Zeroable::zeroed()
+        };
+        assert_eq!(found == 1.0, photon.is_unresolved(), "{state}");
+        assert_eq!(photon.is_unresolved(), state & 3 == 3 || state & 512 != 0, "{state}");
+    }
 }

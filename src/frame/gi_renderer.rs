@@ -443,6 +443,7 @@ impl GiRenderer {
             queue: inputs.queue,
             env_maps: &indirect.env_maps,
             photons: &indirect.photons,
+            shared: None,
             sample_offset: inputs.sample_offset,
             settings: &self.settings.tracer,
             timestamps: inputs.timestamps,

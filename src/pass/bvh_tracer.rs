@@ -1,14 +1,16 @@
-//! Rays against the triangles themselves: lists of rays, closest hit or any hit.
+//! Rays against the triangles themselves: the photon walk, and lists of rays.
 //!
-//! Inputs: [`BvhGeometry`], [`Rays`]. Output: hits of [`Rays`]. Cost: a ray visits some ten to thirty nodes of 80 bytes and
-//! a few triangles of 48 (`docs/tracing.md`). Sources: Ylitie et al. 2017 (compressed wide trees), Woop et al. 2013
-//! (watertight triangles); Yao's general tracer, section 3.2. Limits: geometry that a host deforms on the GPU alone is not
-//! in the trees.
+//! Inputs: [`BvhGeometry`], and [`Photons`] with hop 0 or [`Rays`]. Output: [`Photons`], hops 1 to its number of bounces,
+//! or of one hop those that another tracer lost ([`SharedHop`]), or hits of [`Rays`]. Cost: a ray visits some ten to thirty nodes of 80 bytes and a few triangles of 48
+//! (`docs/tracing.md`). Sources: Ylitie et al. 2017 (compressed wide trees), Woop et al. 2013 (watertight triangles); Yao's
+//! general tracer, section 3.2. Limits: geometry that a host deforms on the GPU alone is not in the trees; surfaces scatter
+//! as Lambertian ones. No ray is lost: it meets a triangle or has escaped.
 
 use super::dispatch_64;
+use super::photon_walk::{PhotonWalk, PhotonWalkInputs, PhotonWalkResources, SharedHop};
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::bvh_geometry::BVH_SLOTS;
-use crate::resource::{BvhGeometry, Rays};
+use crate::resource::{BvhGeometry, Photons, Rays};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -24,7 +26,10 @@ pub(crate) mod gpu {
 }
 
 /// Bindings of group 0 of `shaders/pass/bvh_tracer/trace_rays.wgsl`, in order.
-pub(crate) const SLOTS: [Slot; 3] = [Slot::Uniform, Slot::Storage, Slot::StorageMut];
+pub(crate) const RAY_SLOTS: [Slot; 3] = [Slot::Uniform, Slot::Storage, Slot::StorageMut];
+
+/// Bindings of group 2 of `shaders/pass/bvh_tracer/walk_lost.wgsl`.
+pub(crate) const LOST_SLOTS: [Slot; 1] = [Slot::Storage];
 
 /// What is asked of a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -40,8 +45,12 @@ pub enum RayQuery {
 #[derive(Debug)]
 pub struct BvhTracer {
     device: wgpu::Device,
-    layout: wgpu::BindGroupLayout,
+    photon_walk: PhotonWalk,
+    ray_layout: wgpu::BindGroupLayout,
     geometry_layout: wgpu::BindGroupLayout,
+    lost_layout: wgpu::BindGroupLayout,
+    walk: wgpu::ComputePipeline,
+    walk_lost: wgpu::ComputePipeline,
     /// By [`RayQuery`].
     traces: [wgpu::ComputePipeline; 2],
 }
@@ -49,14 +58,35 @@ pub struct BvhTracer {
 /// Uniforms and bind groups.
 #[derive(Debug)]
 pub struct BvhTracerResources {
-    params: wgpu::Buffer,
-    groups: BindGroupCache,
+    walk: PhotonWalkResources,
+    ray_params: wgpu::Buffer,
+    ray_groups: BindGroupCache,
     geometry_groups: BindGroupCache,
+    lost_groups: BindGroupCache,
 }
 
-/// What a frame gives it.
+/// What a frame gives it for the photon walk.
 #[derive(Debug, Clone, Copy)]
 pub struct BvhTracerInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// What photons meet, of the instances that environment maps see; prepared for this frame.
+    pub geometry: &'a BvhGeometry,
+    /// Hop 0 is read, the others are written; of a shared hop, the one before it and the listed slots of its own.
+    pub photons: &'a Photons,
+    /// `None`: the whole walk. A hop: this one, of the paths that the other tracer has listed.
+    pub shared: Option<SharedHop<'a>>,
+    /// As for the emitter.
+    pub sample_offset: u32,
+    /// Scatterings before Russian roulette may end a path. Lower is faster and noisier.
+    pub roulette_from: u32,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+/// What a frame gives it for a list of rays.
+#[derive(Debug, Clone, Copy)]
+pub struct BvhTracerRayInputs<'a> {
     /// For the uniforms of this frame.
     pub queue: &'a wgpu::Queue,
     /// What rays meet; prepared for this frame.
@@ -73,35 +103,96 @@ impl BvhTracer {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
         let stages = wgpu::ShaderStages::COMPUTE;
-        let layout = device::layout(device, "lightfall::BvhTracer", stages, &SLOTS);
+        let photon_walk = PhotonWalk::new(device, "lightfall::BvhTracer::walk");
+        let ray_layout = device::layout(device, "lightfall::BvhTracer::rays", stages, &RAY_SLOTS);
         let geometry_layout = device::layout(device, "lightfall::BvhTracer::geometry", stages, &BVH_SLOTS);
-        let trace = |entry_point| {
+        let lost_layout = device::layout(device, "lightfall::BvhTracer::lost", stages, &LOST_SLOTS);
+        let pipeline = |label, source, entry_point, layouts: &[&wgpu::BindGroupLayout]| {
             device::compute_pipeline(
                 device,
                 &ComputeSpec {
-                    label: "lightfall::BvhTracer::trace",
-                    source: wgsl::BVH_TRACER,
+                    label,
+                    source,
                     entry_point,
-                    layouts: &[&layout, &geometry_layout],
+                    layouts,
                     constants: &[],
                 },
             )
         };
-        let traces = ["trace_closest", "trace_any"].map(trace);
+        let trace = |entry_point| {
+            let layouts = [&ray_layout, &geometry_layout];
+            pipeline(
+                "lightfall::BvhTracer::trace",
+                wgsl::BVH_TRACER_RAYS,
+                entry_point,
+                &layouts,
+            )
+        };
         Self {
             device: device.clone(),
-            layout,
+            walk: pipeline(
+                "lightfall::BvhTracer::walk",
+                wgsl::BVH_TRACER,
+                "walk_photons",
+                &[&photon_walk.layout, &geometry_layout],
+            ),
+            walk_lost: pipeline(
+                "lightfall::BvhTracer::walk_lost",
+                wgsl::BVH_TRACER,
+                "walk_lost",
+                &[&photon_walk.layout, &geometry_layout, &lost_layout],
+            ),
+            traces: ["trace_closest", "trace_any"].map(trace),
+            photon_walk,
+            ray_layout,
             geometry_layout,
-            traces,
+            lost_layout,
         }
     }
 
-    /// Records the tracing of a list of rays.
+    /// Records the photon walk, or the listed part of a shared hop.
     pub fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         resources: &mut BvhTracerResources,
         inputs: &BvhTracerInputs<'_>,
+    ) {
+        let walk = PhotonWalkInputs {
+            queue: inputs.queue,
+            photons: inputs.photons,
+            shared: inputs.shared,
+            sample_offset: inputs.sample_offset,
+            roulette_from: inputs.roulette_from,
+        };
+        let Some(walk) = self.photon_walk.prepare(&mut resources.walk, &walk) else {
+            return;
+        };
+        let label = "lightfall::BvhTracer";
+        let geometry = self.geometry_group(resources, inputs.geometry);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_bind_group(0, &walk.group, &[]);
+        pass.set_bind_group(1, &geometry, &[]);
+        match inputs.shared {
+            None => {
+                pass.set_pipeline(&self.walk);
+                pass.dispatch_workgroups(walk.groups[0], walk.groups[1], 1);
+            }
+            Some(hop) => {
+                let (groups, layout) = (&mut resources.lost_groups, &self.lost_layout);
+                let lost = groups.get(&self.device, label, layout, &[hop.lost.buffer().into()]);
+                pass.set_pipeline(&self.walk_lost);
+                pass.set_bind_group(2, &lost, &[]);
+                pass.dispatch_workgroups_indirect(hop.lost.buffer(), 0);
+            }
+        }
+    }
+
+    /// Records the tracing of a list of rays.
+    pub fn record_rays(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut BvhTracerResources,
+        inputs: &BvhTracerRayInputs<'_>,
     ) {
         let (groups, row) = dispatch_64(inputs.rays.count());
         let params = gpu::Params {
@@ -110,41 +201,54 @@ impl BvhTracer {
         };
         inputs
             .queue
-            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
-        let label = "lightfall::BvhTracer";
+            .write_buffer(&resources.ray_params, 0, bytemuck::bytes_of(&params));
+        let label = "lightfall::BvhTracer::rays";
         let bound = [
-            (&resources.params).into(),
+            (&resources.ray_params).into(),
             inputs.rays.buffer().into(),
             inputs.rays.hits().into(),
         ];
-        let group = resources.groups.get(&self.device, label, &self.layout, &bound);
-        let bound = inputs.geometry.bound();
-        let geometry = resources
-            .geometry_groups
-            .get(&self.device, label, &self.geometry_layout, &bound);
+        let rays = resources.ray_groups.get(&self.device, label, &self.ray_layout, &bound);
+        let geometry = self.geometry_group(resources, inputs.geometry);
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.traces[inputs.query as usize]);
-        pass.set_bind_group(0, &group, &[]);
+        pass.set_bind_group(0, &rays, &[]);
         pass.set_bind_group(1, &geometry, &[]);
         pass.dispatch_workgroups(groups[0], groups[1], 1);
+    }
+
+    fn geometry_group(&self, resources: &mut BvhTracerResources, geometry: &BvhGeometry) -> wgpu::BindGroup {
+        let label = "lightfall::BvhTracer::geometry";
+        let (groups, layout) = (&mut resources.geometry_groups, &self.geometry_layout);
+        groups.get(&self.device, label, layout, &geometry.bound())
     }
 }
 
 impl BvhTracerResources {
-    /// Resources on this device.
+    /// For the whole walk and for lists of rays.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] if the device grants next to nothing.
     pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
+        Self::for_shared_hops(device, 0)
+    }
+
+    /// The same, and for up to `bounces` hops that are shared with another tracer.
+    ///
+    /// # Errors
+    /// As [`BvhTracerResources::new`].
+    pub fn for_shared_hops(device: &wgpu::Device, bounces: u32) -> Result<Self, Error> {
         Ok(Self {
-            params: device::uniform_buffer::<gpu::Params>(device, "lightfall::BvhTracer::params")?,
-            groups: BindGroupCache::default(),
+            walk: PhotonWalkResources::new(device, "lightfall::BvhTracer::walk", bounces)?,
+            ray_params: device::uniform_buffer::<gpu::Params>(device, "lightfall::BvhTracer::params")?,
+            ray_groups: BindGroupCache::default(),
             geometry_groups: BindGroupCache::default(),
+            lost_groups: BindGroupCache::default(),
         })
     }
 
     /// Bytes allocated.
     pub fn memory_use(&self) -> u64 {
-        self.params.size()
+        self.walk.memory_use() + self.ray_params.size()
     }
 }

@@ -27,7 +27,7 @@ pub(crate) mod upsampler;
 
 pub use accumulator::{Accumulator, AccumulatorInputs, AccumulatorResources};
 #[cfg(feature = "bvh")]
-pub use bvh_tracer::{BvhTracer, BvhTracerInputs, BvhTracerResources, RayQuery};
+pub use bvh_tracer::{BvhTracer, BvhTracerInputs, BvhTracerRayInputs, BvhTracerResources, RayQuery};
 pub use composite::{Composite, CompositeInputs, CompositeResources, CompositeSettings};
 pub use direct_light::{DirectLight, DirectLightInputs, DirectLightResources};
 pub use env_map_capture::{EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources};
@@ -46,6 +46,7 @@ pub use photon_splatter::{
     Bandwidth, Kernel, PhotonSplatter, PhotonSplatterConfig, PhotonSplatterInputs, PhotonSplatterResources,
     PhotonSplatterSettings, SplatShape,
 };
+pub use photon_walk::SharedHop;
 pub use shadow_map_capture::{ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources};
 pub(crate) use soft_shadow::MAX_TAPS;
 pub use soft_shadow::{PenumbraSearch, SoftShadow, SoftShadowInputs, SoftShadowResources, SoftShadowSettings};

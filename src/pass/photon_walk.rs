@@ -1,9 +1,9 @@
-//! The photon walk apart from what traces its rays: uniform, bindings and dispatch that all tracers share.
+//! The photon walk apart from what traces its rays: uniforms, bindings and dispatch that all tracers share.
 
 use super::dispatch_64;
 use crate::Error;
 use crate::gpu::{self as device, BindGroupCache, Slot};
-use crate::resource::Photons;
+use crate::resource::{LostRays, Photons};
 
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
@@ -24,6 +24,16 @@ pub(crate) mod gpu {
 /// Bindings of group 0 of `shaders/pass/photon_walk/walk_photons.wgsl`, in order.
 pub(crate) const SLOTS: [Slot; 2] = [Slot::Uniform, Slot::StorageMut];
 
+/// One hop of a walk that two tracers share. The first walks it for all paths and lists those that it lost; the second
+/// walks it again for these. Then comes the next hop.
+#[derive(Debug, Clone, Copy)]
+pub struct SharedHop<'a> {
+    /// From 1 to the number of bounces. Others, and those that the tracer's resources have no room for, are left out.
+    pub number: u32,
+    /// The paths lost at this hop, of those that it has room for.
+    pub lost: &'a LostRays,
+}
+
 /// Group 0 of a tracer's pipelines.
 #[derive(Debug)]
 pub(super) struct PhotonWalk {
@@ -32,10 +42,11 @@ pub(super) struct PhotonWalk {
     pub(super) layout: wgpu::BindGroupLayout,
 }
 
-/// Uniform and bind groups.
+/// Uniforms and bind groups.
 #[derive(Debug)]
 pub(super) struct PhotonWalkResources {
-    params: wgpu::Buffer,
+    /// Of the whole walk, then of each shared hop: all hops of a frame are in one submission.
+    params: Vec<wgpu::Buffer>,
     groups: BindGroupCache,
 }
 
@@ -44,8 +55,17 @@ pub(super) struct PhotonWalkResources {
 pub(super) struct PhotonWalkInputs<'a> {
     pub(super) queue: &'a wgpu::Queue,
     pub(super) photons: &'a Photons,
+    pub(super) shared: Option<SharedHop<'a>>,
     pub(super) sample_offset: u32,
     pub(super) roulette_from: u32,
+}
+
+/// The uniform of a walk, written, and group 0.
+pub(super) struct PreparedWalk {
+    pub(super) params: wgpu::Buffer,
+    pub(super) group: wgpu::BindGroup,
+    /// Workgroups for all paths.
+    pub(super) groups: [u32; 2],
 }
 
 impl PhotonWalk {
@@ -58,33 +78,51 @@ impl PhotonWalk {
         }
     }
 
-    /// Writes the uniform and returns the bind group.
-    pub(super) fn group(&self, resources: &mut PhotonWalkResources, inputs: &PhotonWalkInputs<'_>) -> wgpu::BindGroup {
-        let (_, row) = dispatch_64(inputs.photons.count());
+    /// Writes the uniform; `None` for a hop that there is not, or no room for.
+    pub(super) fn prepare(
+        &self,
+        resources: &mut PhotonWalkResources,
+        inputs: &PhotonWalkInputs<'_>,
+    ) -> Option<PreparedWalk> {
+        let bounces = inputs.photons.bounces();
+        let (place, hops) = match inputs.shared {
+            None => (0, [1, bounces]),
+            Some(hop) if (1..=bounces).contains(&hop.number) => (hop.number as usize, [hop.number; 2]),
+            Some(_) => return None,
+        };
+        let buffer = resources.params.get(place)?;
+        let (groups, row) = dispatch_64(inputs.photons.count());
         let params = gpu::WalkParams {
             photon_count: inputs.photons.count(),
-            first_hop: 1,
-            last_hop: inputs.photons.bounces(),
+            first_hop: hops[0],
+            last_hop: hops[1],
             roulette_from: inputs.roulette_from,
             sample_offset: inputs.sample_offset,
             row,
         };
-        let bytes = bytemuck::bytes_of(&params);
-        inputs.queue.write_buffer(&resources.params, 0, bytes);
-        let bound = [(&resources.params).into(), inputs.photons.buffer().into()];
-        resources.groups.get(&self.device, self.label, &self.layout, &bound)
+        inputs.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&params));
+        let bound = [buffer.into(), inputs.photons.buffer().into()];
+        Some(PreparedWalk {
+            params: buffer.clone(),
+            group: resources.groups.get(&self.device, self.label, &self.layout, &bound),
+            groups,
+        })
     }
 }
 
 impl PhotonWalkResources {
-    pub(super) fn new(device: &wgpu::Device, label: &'static str) -> Result<Self, Error> {
+    /// For the whole walk and up to `shared_hops` shared ones.
+    pub(super) fn new(device: &wgpu::Device, label: &'static str, shared_hops: u32) -> Result<Self, Error> {
+        let params = (0..=shared_hops)
+            .map(|_| device::uniform_buffer::<gpu::WalkParams>(device, label))
+            .collect::<Result<Vec<_>, _>>()?;
         Ok(Self {
-            params: device::uniform_buffer::<gpu::WalkParams>(device, label)?,
-            groups: BindGroupCache::default(),
+            groups: BindGroupCache::for_uses(params.len()),
+            params,
         })
     }
 
     pub(super) fn memory_use(&self) -> u64 {
-        self.params.size()
+        self.params.iter().map(wgpu::Buffer::size).sum()
     }
 }

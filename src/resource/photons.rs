@@ -13,7 +13,8 @@ pub const PHOTON_BYTES: u64 = size_of::<Photon>() as u64;
 pub struct Photon {
     /// Where the hop ended, unit frame.
     pub position: [f32; 3],
-    /// Low two bits: a [`PhotonState`]. Bit 8: the path came straight from its light.
+    /// Low two bits: a [`PhotonState`]. Bit 8: the path came straight from its light. Bit 9: the tracer is not sure of the
+    /// hop. Others 0.
     pub state: u32,
     /// Radiant flux that the hop carried, unit frame, before the surface takes its share.
     pub flux: [f32; 3],
@@ -47,6 +48,9 @@ pub enum PhotonState {
 impl Photon {
     /// Bit of `state` that marks a photon straight from its light.
     pub const FIRST_HIT: u32 = 256;
+    /// Bit of `state` that marks a hop of which the tracer is not sure: a surer one should walk it again. No tracer of this
+    /// crate sets it yet.
+    pub const TENTATIVE: u32 = 512;
 
     /// What became of this hop.
     pub fn state(&self) -> PhotonState {
@@ -61,6 +65,11 @@ impl Photon {
     /// Whether the path came straight from its light: direct light, which is not splatted.
     pub fn is_first_hit(&self) -> bool {
         self.state & Self::FIRST_HIT != 0
+    }
+
+    /// Whether a surer tracer should walk this hop again: it is lost or tentative.
+    pub fn is_unresolved(&self) -> bool {
+        self.state() == PhotonState::Lost || self.state & Self::TENTATIVE != 0
     }
 
     /// A unit vector as `normal` and `direction` hold it: the bits that `octahedral_pack` of the shaders makes.

@@ -7,6 +7,8 @@
 // Random dimensions of Russian roulette start here, above those of directions.
 const WALK_ROULETTE_DIMENSION: u32 = 1024u;
 const WALK_INVERSE_PI: f32 = 0.318309886;
+// A hop counts as no shorter than this, unit frame, so that its density is finite.
+const WALK_SHORTEST: f32 = 0x1p-20;
 
 // What survives a scattering: flux times reflectance, or zero. From `roulette_from` on a path survives with the
 // probability of its largest factor, and is then worth that much more.
@@ -33,11 +35,12 @@ fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) ->
         return photon_gone(select(PHOTON_LOST, PHOTON_ESCAPED, hit.kind == HIT_ESCAPED), flux, direction, photon.light);
     }
     let cosines = local.z * max(0.0, -dot(hit.normal, direction));
+    let distance = max(hit.distance, WALK_SHORTEST);
     return Photon(
         hit.position,
         PHOTON_STORED,
         flux,
-        WALK_INVERSE_PI * cosines / (hit.distance * hit.distance),
+        WALK_INVERSE_PI * cosines / (distance * distance),
         octahedral_pack(hit.normal),
         octahedral_pack(direction),
         reflectance_pack(hit.reflectance),

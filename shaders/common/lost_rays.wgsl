@@ -1,0 +1,15 @@
+// Twin of `resource::LostRays`: paths whose hop a tracer could not resolve, in ascending order.
+
+struct LostRays {
+    // Of an indirect dispatch with an invocation for each path, 64 to a workgroup
+    workgroups: array<u32, 3>,
+    count: u32,
+    paths: array<u32>,
+}
+
+// Workgroups for `count` invocations of 64, none above 65535 along an axis.
+fn lost_rays_workgroups(count: u32) -> array<u32, 3> {
+    let groups = count / 64u + u32(count % 64u > 0u);
+    let rows = max(1u, groups / 65535u + u32(groups % 65535u > 0u));
+    return array<u32, 3>(groups / rows + u32(groups % rows > 0u), rows, 1u);
+}
