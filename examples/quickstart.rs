@@ -31,10 +31,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene_inputs = SceneInputs {
         queue,
         geometry: &geometry,
+        bvh: None,
         sample_offset: 0,
         timestamps: None,
     };
-    renderer.record_scene(&mut encoder, &scene_inputs);
+    renderer.record_scene(&mut encoder, &scene_inputs)?;
     let composite = CompositeSettings {
         output_scale: frame.output_scale(1.0)?,
         ..Default::default()

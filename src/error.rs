@@ -2,7 +2,8 @@
 
 /// Anything that a constructor or a validation can refuse.
 ///
-/// Recording a pass does not fail: what could go wrong is refused when the pass, its resources or its inputs are made.
+/// Recording a pass does not fail: what could go wrong is refused when the pass, its resources or its inputs are made. A
+/// renderer that composes passes refuses a frame before it records any.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -97,6 +98,16 @@ pub enum Error {
         expected: usize,
         /// How many there are.
         found: usize,
+    },
+    /// A stage that runs was not given what it works on.
+    #[error("{stage} needs {input}; {remedy}")]
+    MissingInput {
+        /// The stage.
+        stage: &'static str,
+        /// What it needs, by the name of the field.
+        input: &'static str,
+        /// What to do.
+        remedy: &'static str,
     },
     /// A reference image is of no use to compare with.
     #[error("the reference image {problem}")]

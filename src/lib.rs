@@ -37,7 +37,7 @@
 //! # Example
 //!
 //! ```
-//! # #[cfg(feature = "samples")]
+//! # #[cfg(all(feature = "samples", feature = "bvh"))]
 //! # fn main() -> Result<(), lightfall::Error> {
 //! use lightfall::frame::{GiRenderer, SceneInputs, Settings, ViewInputs};
 //! use lightfall::pass::CompositeSettings;
@@ -66,10 +66,11 @@
 //! let scene_inputs = SceneInputs {
 //!     queue: &queue,
 //!     geometry: &geometry,
+//!     bvh: None,
 //!     sample_offset: 0,
 //!     timestamps: None,
 //! };
-//! renderer.record_scene(&mut encoder, &scene_inputs);
+//! renderer.record_scene(&mut encoder, &scene_inputs)?;
 //! let composite = CompositeSettings {
 //!     output_scale: frame.output_scale(1.0)?,
 //!     ..Default::default()
@@ -89,7 +90,7 @@
 //! # assert_eq!(image.texture().size().width, 128);
 //! # Ok(())
 //! # }
-//! # #[cfg(not(feature = "samples"))]
+//! # #[cfg(not(all(feature = "samples", feature = "bvh")))]
 //! # fn main() {}
 //! ```
 //!

@@ -486,10 +486,11 @@ impl<'a> Host<'a> {
         let scene_inputs = SceneInputs {
             queue,
             geometry: &self.geometry,
+            bvh: None,
             sample_offset: 0,
             timestamps: None,
         };
-        self.renderer.record_scene(&mut encoder, &scene_inputs);
+        self.renderer.record_scene(&mut encoder, &scene_inputs).unwrap();
         let view_inputs = ViewInputs {
             queue,
             geometry: &self.geometry,

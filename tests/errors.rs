@@ -9,7 +9,7 @@ use lightfall::resource::{
     Visibility,
 };
 use lightfall::scene::{EnvironmentImage, Light, LightKind, Scene, SceneBounds, SceneSummary, UnitFrame, samples};
-use lightfall::{Error, Timestamps, wgpu};
+use lightfall::{Error, Timestamps, creation_count, wgpu};
 
 /// Runs on a fresh device and fails on any validation error.
 fn on_device<T>(body: impl FnOnce(&wgpu::Device, &wgpu::Queue) -> T) -> T {
@@ -536,4 +536,52 @@ fn reading_back_from_a_lost_device_is_an_error() {
     device.destroy();
     let error = lightfall::read_buffer_blocking::<u32>(&device, &queue, photons.buffer()).unwrap_err();
     assert!(matches!(error, Error::ReadBack { .. }), "{error}");
+}
+
+#[cfg(feature = "bvh")]
+#[test]
+fn a_frame_that_needs_triangles_and_has_none_is_refused_before_anything_is_recorded() {
+    use lightfall::frame::{SceneInputs, TracerKind};
+    use lightfall::resource::CameraView;
+    for tracer_kind in [TracerKind::Bvh, TracerKind::Hybrid] {
+        on_device(|device, queue| {
+            let settings = Settings {
+                tracer_kind,
+                ..Settings::fast()
+            };
+            let scene = samples::cornell(0.0);
+            let mut geometry = MeshGeometry::new(device, queue, &scene).unwrap();
+            let mut renderer = GiRenderer::new(device, &settings).unwrap();
+            let summary = SceneSummary::of(&scene).unwrap();
+            let mut record = |lights: usize| {
+                let summary = SceneSummary {
+                    lights,
+                    ..summary.clone()
+                };
+                let frame = renderer.set_scene(queue, &summary, &scene.lights[..lights]).unwrap();
+                let mut cameras = [CameraView::new(&frame, &scene.cameras[0], [8, 8], [0.0; 2])];
+                renderer.prepare(queue, &mut geometry, &mut cameras).unwrap();
+                let mut encoder = device.create_command_encoder(&Default::default());
+                let inputs = SceneInputs {
+                    queue,
+                    geometry: &geometry,
+                    bvh: None,
+                    sample_offset: 0,
+                    timestamps: None,
+                };
+                let before = creation_count();
+                let result = renderer.record_scene(&mut encoder, &inputs);
+                (result, creation_count() == before)
+            };
+            let (refused, nothing_recorded) = record(1);
+            let error = refused.unwrap_err();
+            assert!(matches!(error, Error::MissingInput { .. }), "{error}");
+            for word in ["BvhTracer", "SceneInputs::bvh", "tracer.kind"] {
+                assert!(error.to_string().contains(word), "{error}");
+            }
+            assert!(nothing_recorded);
+            // In the dark no ray is traced.
+            assert_eq!(record(0).0, Ok(()));
+        });
+    }
 }

@@ -178,10 +178,11 @@ fn composed(engine: &Engine, subsampling: Subsampling) -> Composed {
     let scene_inputs = SceneInputs {
         queue,
         geometry,
+        bvh: None,
         sample_offset: 0,
         timestamps,
     };
-    renderer.record_scene(&mut encoder, &scene_inputs);
+    renderer.record_scene(&mut encoder, &scene_inputs).unwrap();
     let composite = CompositeSettings {
         output_scale: frame.output_scale(1.0).unwrap(),
         direct: 0.0,

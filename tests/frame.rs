@@ -4,8 +4,8 @@
 mod common;
 
 use common::{Component, Gpu, Offline, assert_no_errors, gpu, mean, offline};
-use lightfall::frame::{GiRenderer, SceneInputs, Settings, Stage, ViewInputs, ViewResources};
-use lightfall::glam::DVec3;
+use lightfall::frame::{GiRenderer, SceneInputs, Settings, Stage, TracerKind, ViewInputs, ViewResources};
+use lightfall::glam::{DVec3, Vec3};
 use lightfall::pass::*;
 use lightfall::resource::*;
 use lightfall::scene::{EnvironmentImage, Light, LightKind, Material, Scene, SceneSummary, samples};
@@ -23,6 +23,10 @@ fn small() -> Settings {
     }
 }
 
+fn triangles(device: &wgpu::Device, queue: &wgpu::Queue, scene: &Scene) -> BvhGeometry {
+    BvhGeometry::new(device, queue, scene, &BvhGeometryConfig::default()).unwrap()
+}
+
 /// A renderer whose environment maps have their places.
 fn placed(gpu: &Gpu, settings: &Settings, scene: &Scene, geometry: &mut MeshGeometry) -> GiRenderer {
     let mut renderer = GiRenderer::new(&gpu.device, settings).unwrap();
@@ -36,12 +40,13 @@ fn placed(gpu: &Gpu, settings: &Settings, scene: &Scene, geometry: &mut MeshGeom
 fn record(
     renderer: &mut GiRenderer,
     view: &mut ViewResources,
-    geometry: &mut MeshGeometry,
+    (geometry, bvh): (&mut MeshGeometry, &mut BvhGeometry),
     scene: &Scene,
     (device, queue): (&wgpu::Device, &wgpu::Queue),
 ) -> wgpu::CommandEncoder {
     let summary = SceneSummary::of(scene).unwrap();
     let frame = renderer.set_scene(queue, &summary, &scene.lights).unwrap();
+    bvh.prepare(queue, &frame).unwrap();
     let size = view.g_buffer().size();
     let mut cameras = [CameraView::new(&frame, &scene.cameras[0], size, [0.0; 2])];
     renderer.prepare(queue, geometry, &mut cameras).unwrap();
@@ -49,10 +54,11 @@ fn record(
     let scene_inputs = SceneInputs {
         queue,
         geometry,
+        bvh: Some(bvh),
         sample_offset: 0,
         timestamps: None,
     };
-    renderer.record_scene(&mut encoder, &scene_inputs);
+    renderer.record_scene(&mut encoder, &scene_inputs).unwrap();
     let composite = CompositeSettings {
         output_scale: frame.output_scale(1.0).unwrap(),
         ..Default::default()
@@ -83,39 +89,34 @@ fn every_pass_is_made_and_recorded_on_a_device_that_grants_only_the_defaults() {
 
 fn make_and_record_every_pass(device: &wgpu::Device, queue: &wgpu::Queue) {
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
-    for (shape, kernel, method, subsampling) in [
+    use {Kernel as K, SplatShape as Shape, Subsampling as S, TraceMethod as Method, TracerKind as Kind};
+    for (shape, kernel, kind, method, subsampling) in [
         (
-            SplatShape::Tiled,
-            Kernel::Epanechnikov,
-            TraceMethod::OrderedMarch,
-            Subsampling::Full,
+            Shape::Tiled,
+            K::Epanechnikov,
+            Kind::ImageSpace,
+            Method::OrderedMarch,
+            S::Full,
         ),
-        (SplatShape::Tiled, Kernel::Cone, TraceMethod::Plane, Subsampling::Half),
-        (
-            SplatShape::Quads,
-            Kernel::Constant,
-            TraceMethod::Paper,
-            Subsampling::Quarter,
-        ),
-        (SplatShape::Quads, Kernel::Cone, TraceMethod::Plane, Subsampling::Full),
-        (
-            SplatShape::Tiled,
-            Kernel::Constant,
-            TraceMethod::Plane,
-            Subsampling::Eighth,
-        ),
+        (Shape::Tiled, K::Cone, Kind::Bvh, Method::Plane, S::Half),
+        (Shape::Quads, K::Constant, Kind::ImageSpace, Method::Paper, S::Quarter),
+        (Shape::Quads, K::Cone, Kind::Hybrid, Method::Plane, S::Full),
+        (Shape::Tiled, K::Constant, Kind::Hybrid, Method::OrderedMarch, S::Eighth),
     ] {
         let mut settings = small();
         settings.subsampling = subsampling;
         settings.splatter_config.shape = shape;
         settings.splatter_config.kernel = kernel;
+        settings.tracer_kind = kind;
         settings.tracer.method = method;
         for name in samples::NAMES {
             let scene = samples::by_name(name, 0.5).unwrap();
             let mut geometry = MeshGeometry::new(device, queue, &scene).unwrap();
+            let mut bvh = triangles(device, queue, &scene);
             let mut renderer = GiRenderer::new(device, &settings).unwrap();
             let mut view = renderer.new_view([33, 17]).unwrap();
-            let encoder = record(&mut renderer, &mut view, &mut geometry, &scene, (device, queue));
+            let both = (&mut geometry, &mut bvh);
+            let encoder = record(&mut renderer, &mut view, both, &scene, (device, queue));
             queue.submit([encoder.finish()]);
             renderer.place_env_maps_blocking(queue, &mut geometry).unwrap();
         }
@@ -158,8 +159,52 @@ fn record_the_other_passes(device: &wgpu::Device, queue: &wgpu::Queue) {
     queue.submit([encoder.finish()]);
 }
 
+/// The photon walk over one tracer, or over both in turns.
+fn walk_by_hand(
+    encoder: &mut wgpu::CommandEncoder,
+    (device, queue): (&wgpu::Device, &wgpu::Queue),
+    settings: &Settings,
+    (env_maps, geometry, photons): (&EnvMaps, &BvhGeometry, &Photons),
+) {
+    let lost = LostRays::new(device, photons).unwrap();
+    let bounces = photons.bounces();
+    let (image_space, triangles) = (ImageSpaceTracer::new(device), BvhTracer::new(device));
+    let mut image_space_own = ImageSpaceTracerResources::for_shared_hops(device, bounces).unwrap();
+    let mut triangles_own = BvhTracerResources::for_shared_hops(device, bounces).unwrap();
+    let mut inputs = ImageSpaceTracerInputs {
+        queue,
+        env_maps,
+        photons,
+        shared: None,
+        sample_offset: 0,
+        settings: &settings.tracer,
+        timestamps: None,
+    };
+    let mut bvh_inputs = BvhTracerInputs {
+        queue,
+        geometry,
+        photons,
+        shared: None,
+        sample_offset: 0,
+        roulette_from: settings.tracer.roulette_from,
+        timestamps: None,
+    };
+    match settings.tracer_kind {
+        TracerKind::ImageSpace => image_space.record(encoder, &mut image_space_own, &inputs),
+        TracerKind::Bvh => triangles.record(encoder, &mut triangles_own, &bvh_inputs),
+        TracerKind::Hybrid => {
+            for number in 1..=bounces {
+                inputs.shared = Some(SharedHop { number, lost: &lost });
+                bvh_inputs.shared = inputs.shared;
+                image_space.record(encoder, &mut image_space_own, &inputs);
+                triangles.record(encoder, &mut triangles_own, &bvh_inputs);
+            }
+        }
+    }
+}
+
 /// The frame of `record`, composed by hand from public passes and resources.
-fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], centers_from: &EnvMaps) -> Vec<[f32; 4]> {
+fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], centers: &[Vec3]) -> Vec<[f32; 4]> {
     let (device, queue) = (&gpu.device, &gpu.queue);
     let summary = SceneSummary::of(scene).unwrap();
     let frame = lightfall::scene::UnitFrame::new(&summary.bounds, summary.total_flux).unwrap();
@@ -168,7 +213,7 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
     lights.write(queue, &frame, &scene.lights, settings.photons).unwrap();
     let shadow_maps = ShadowMaps::new(device, &scene.lights, settings.shadow_map_size).unwrap();
     let mut env_maps = EnvMaps::new(device, settings.env_map_count, settings.env_map_size).unwrap();
-    env_maps.set_centers(queue, centers_from.centers()).unwrap();
+    env_maps.set_centers(queue, centers).unwrap();
     let photons = Photons::new(device, settings.photons, settings.bounces).unwrap();
     let mut g_buffer = GBuffer::new(device, size).unwrap();
     let irradiance = || Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float).unwrap();
@@ -221,17 +266,9 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
     };
     let mut emitter = PhotonEmitterResources::new(device).unwrap();
     PhotonEmitter::new(device).record(&mut encoder, &mut emitter, &emitter_inputs);
-    let tracer_inputs = ImageSpaceTracerInputs {
-        queue,
-        env_maps: &env_maps,
-        photons: &photons,
-        shared: None,
-        sample_offset: 0,
-        settings: &settings.tracer,
-        timestamps,
-    };
-    let mut tracer = ImageSpaceTracerResources::new(device).unwrap();
-    ImageSpaceTracer::new(device).record(&mut encoder, &mut tracer, &tracer_inputs);
+    let mut bvh = triangles(device, queue, scene);
+    bvh.prepare(queue, &frame).unwrap();
+    walk_by_hand(&mut encoder, (device, queue), settings, (&env_maps, &bvh, &photons));
     let g_buffer_inputs = GBufferCaptureInputs {
         queue,
         geometry: &geometry,
@@ -303,8 +340,17 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
 #[test]
 fn the_renderer_equals_the_passes_composed_by_hand_bit_for_bit() {
     let Some(gpu) = gpu() else { return };
-    for subsampling in [Subsampling::Full, Subsampling::Quarter] {
-        let settings = Settings { subsampling, ..small() };
+    for (tracer_kind, subsampling) in [
+        (TracerKind::ImageSpace, Subsampling::Full),
+        (TracerKind::ImageSpace, Subsampling::Quarter),
+        (TracerKind::Bvh, Subsampling::Full),
+        (TracerKind::Hybrid, Subsampling::Full),
+    ] {
+        let settings = Settings {
+            tracer_kind,
+            subsampling,
+            ..small()
+        };
         equals_by_hand(&gpu, &samples::cornell(0.4), &settings, [42, 30]);
     }
     assert_no_errors(&gpu);
@@ -312,18 +358,15 @@ fn the_renderer_equals_the_passes_composed_by_hand_bit_for_bit() {
 
 fn equals_by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2]) {
     let mut geometry = MeshGeometry::new(&gpu.device, &gpu.queue, scene).unwrap();
+    let mut bvh = triangles(&gpu.device, &gpu.queue, scene);
     let mut renderer = placed(gpu, settings, scene, &mut geometry);
     let mut view = renderer.new_view(size).unwrap();
-    let encoder = record(
-        &mut renderer,
-        &mut view,
-        &mut geometry,
-        scene,
-        (&gpu.device, &gpu.queue),
-    );
+    let both = (&mut geometry, &mut bvh);
+    let encoder = record(&mut renderer, &mut view, both, scene, (&gpu.device, &gpu.queue));
     gpu.queue.submit([encoder.finish()]);
     let composed = read_rgba32float_blocking(&gpu.device, &gpu.queue, view.radiance().view().texture()).unwrap();
-    let by_hand = by_hand(gpu, scene, settings, size, renderer.env_maps().unwrap());
+    let centers = renderer.env_maps().map_or(&[][..], EnvMaps::centers);
+    let by_hand = by_hand(gpu, scene, settings, size, centers);
     assert!(composed.iter().flatten().any(|&v| v > 0.0));
     assert!(composed == by_hand);
 }
@@ -333,6 +376,14 @@ fn nothing_is_created_after_the_first_frame_and_memory_use_is_what_was_created()
     for subsampling in [Subsampling::Full, Subsampling::Half] {
         creates_once(&Settings { subsampling, ..small() });
     }
+    for tracer_kind in [TracerKind::ImageSpace, TracerKind::Bvh, TracerKind::Hybrid] {
+        // More hops than bind groups of one use are remembered.
+        creates_once(&Settings {
+            tracer_kind,
+            bounces: 12,
+            ..small()
+        });
+    }
 }
 
 fn creates_once(settings: &Settings) {
@@ -340,19 +391,22 @@ fn creates_once(settings: &Settings) {
     let scene = samples::cornell(0.0);
     let before = creation_count();
     let mut geometry = MeshGeometry::new(&device, &queue, &scene).unwrap();
+    let mut bvh = triangles(&device, &queue, &scene);
     let mut renderer = GiRenderer::new(&device, settings).unwrap();
     let mut view = renderer.new_view([64, 48]).unwrap();
-    let frame = |time: f64, renderer: &mut GiRenderer, view: &mut ViewResources, geometry: &mut MeshGeometry| {
+    let of_triangles = bvh.memory_use();
+    let mut frame = |time: f64, renderer: &mut GiRenderer, view: &mut ViewResources, geometry: &mut MeshGeometry| {
         let scene = samples::cornell(time);
         for (index, instance) in scene.instances.iter().enumerate() {
             geometry.set_transform(index, instance.transform).unwrap();
+            bvh.set_transform(index, instance.transform).unwrap();
         }
-        let encoder = record(renderer, view, geometry, &scene, (&device, &queue));
+        let encoder = record(renderer, view, (geometry, &mut bvh), &scene, (&device, &queue));
         queue.submit([encoder.finish()]);
     };
     frame(0.0, &mut renderer, &mut view, &mut geometry);
     let settled = creation_count();
-    let in_use = renderer.memory_use() + view.memory_use() + geometry.memory_use();
+    let in_use = renderer.memory_use() + view.memory_use() + geometry.memory_use() + of_triangles;
     // The one-entry view buffer that the geometry started with was replaced when the views of the frame were known.
     let replaced = 256;
     assert_eq!(settled.bytes - before.bytes, in_use + replaced);
@@ -510,6 +564,42 @@ fn rectangles_and_environments_among_other_lights_change_no_bit() {
 }
 
 #[test]
+fn each_tracer_allocates_and_records_what_it_reads_and_no_more() {
+    let Some(gpu) = gpu() else { return };
+    let measure = |tracer_kind: TracerKind, bounces| {
+        let settings = Settings {
+            tracer_kind,
+            bounces,
+            ..small()
+        };
+        let scene = samples::cornell(0.0);
+        let mut offline = Offline::new(&gpu, scene, &settings, 0, [16, 16], Component::All).unwrap();
+        let before = creation_count().passes;
+        offline.render_frame(None).unwrap();
+        let passes = creation_count().passes - before;
+        let renderer = &offline.renderer;
+        assert_eq!(
+            renderer.env_maps().is_some(),
+            tracer_kind.uses_env_maps() && bounces > 0
+        );
+        let memory = renderer.memory_by_resource();
+        let has = |name| memory.iter().any(|&(n, bytes)| n == name && bytes > 0);
+        (passes, ["env_maps", "env_map_selector", "lost_rays"].map(has))
+    };
+    let (direct_light, nothing) = measure(TracerKind::Hybrid, 0);
+    assert_eq!(nothing, [false; 3]);
+    // This frame's share of the candidates, 18 environment-map faces, emission, walk, splatting.
+    let image_space = measure(TracerKind::ImageSpace, 3);
+    assert_eq!(image_space, (direct_light + 1 + 18 + 3, [true, true, false]));
+    // Emission, walk, splatting.
+    assert_eq!(measure(TracerKind::Bvh, 3), (direct_light + 3, [false; 3]));
+    // Each of three hops is walked, listed and walked again.
+    let hybrid = measure(TracerKind::Hybrid, 3);
+    assert_eq!(hybrid, (image_space.0 - 1 + 3 * 3, [true; 3]));
+    assert_no_errors(&gpu);
+}
+
+#[test]
 fn the_energy_of_every_hop_adds_up() {
     let Some(gpu) = gpu() else { return };
     let scene = samples::cornell(0.0);
@@ -627,10 +717,11 @@ fn record_views(
     let scene_inputs = SceneInputs {
         queue,
         geometry,
+        bvh: None,
         sample_offset: 0,
         timestamps: None,
     };
-    renderer.record_scene(&mut encoder, &scene_inputs);
+    renderer.record_scene(&mut encoder, &scene_inputs).unwrap();
     let for_scene = creation_count().passes - before;
     for (view, camera) in views.iter_mut().zip(&cameras) {
         let inputs = ViewInputs {
@@ -710,8 +801,9 @@ fn a_view_made_for_other_settings_is_made_anew() {
     let mut many = placed(&gpu, &small(), &scene, &mut geometry);
     let mut reused = few.new_view([24, 24]).unwrap();
     let mut own = many.new_view([24, 24]).unwrap();
+    let mut bvh = triangles(device.0, device.1, &scene);
     let mut show = |renderer: &mut GiRenderer, view: &mut ViewResources| {
-        let encoder = record(renderer, view, &mut geometry, &scene, device);
+        let encoder = record(renderer, view, (&mut geometry, &mut bvh), &scene, device);
         gpu.queue.submit([encoder.finish()]);
         read_rgba32float_blocking(device.0, device.1, view.radiance().view().texture()).unwrap()
     };

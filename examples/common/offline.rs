@@ -6,7 +6,7 @@ use lightfall::pass::{
     Accumulator, AccumulatorInputs, AccumulatorResources, CompositeSettings, HopStatistics, TraceStatistics,
     TraceStatisticsInputs, TraceStatisticsResources,
 };
-use lightfall::resource::{CameraView, Geometry, MeshGeometry, Radiance};
+use lightfall::resource::{BvhGeometry, BvhGeometryConfig, CameraView, Geometry, MeshGeometry, Radiance};
 use lightfall::scene::{Scene, SceneSummary};
 use lightfall::{Error, Timestamps, wgpu};
 
@@ -24,6 +24,8 @@ pub(crate) struct Offline<'a> {
     gpu: &'a Gpu,
     pub(crate) renderer: GiRenderer,
     pub(crate) geometry: MeshGeometry,
+    /// While the settings trace triangles.
+    bvh: Option<BvhGeometry>,
     pub(crate) view: ViewResources,
     accumulator: Option<(Accumulator, AccumulatorResources)>,
     scene: Scene,
@@ -46,6 +48,8 @@ impl<'a> Offline<'a> {
     ) -> Result<Self, Error> {
         let (device, queue) = (&gpu.device, &gpu.queue);
         let mut geometry = MeshGeometry::new(device, queue, &scene)?;
+        let bvh = || BvhGeometry::new(device, queue, &scene, &BvhGeometryConfig::default());
+        let bvh = settings.tracer_kind.uses_triangles().then(bvh).transpose()?;
         let mut renderer = GiRenderer::new(device, settings)?;
         let summary = SceneSummary::of(&scene)?;
         renderer.set_scene(queue, &summary, &scene.lights)?;
@@ -67,6 +71,7 @@ impl<'a> Offline<'a> {
             view: renderer.new_view(size)?,
             renderer,
             geometry,
+            bvh,
             accumulator,
             scene,
             summary,
@@ -82,6 +87,9 @@ impl<'a> Offline<'a> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let frame = self.renderer.set_scene(queue, &self.summary, &self.scene.lights)?;
         self.renderer.geometry_changed();
+        if let Some(bvh) = &mut self.bvh {
+            bvh.prepare(queue, &frame)?;
+        }
         self.composite.output_scale = frame.output_scale(1.0)?;
         let jitter = match self.accumulator {
             Some(_) => CameraView::jitter(self.frames),
@@ -104,10 +112,11 @@ impl<'a> Offline<'a> {
         let scene_inputs = SceneInputs {
             queue,
             geometry,
+            bvh: self.bvh.as_ref(),
             sample_offset,
             timestamps,
         };
-        self.renderer.record_scene(&mut encoder, &scene_inputs);
+        self.renderer.record_scene(&mut encoder, &scene_inputs)?;
         let view_inputs = ViewInputs {
             queue,
             geometry,
@@ -136,6 +145,9 @@ impl<'a> Offline<'a> {
     pub(crate) fn set_scene(&mut self, scene: Scene) -> Result<(), Error> {
         for (index, instance) in scene.instances.iter().enumerate() {
             self.geometry.set_transform(index, instance.transform)?;
+            if let Some(bvh) = &mut self.bvh {
+                bvh.set_transform(index, instance.transform)?;
+            }
         }
         self.summary = SceneSummary::of(&scene)?;
         self.scene = scene;
@@ -185,6 +197,9 @@ impl<'a> Offline<'a> {
         let mut list = self.renderer.memory_by_resource();
         list.extend(self.view.memory_by_resource());
         list.push(("geometry", self.geometry.memory_use()));
+        if let Some(bvh) = &self.bvh {
+            list.push(("bvh", bvh.memory_use()));
+        }
         if let Some((_, resources)) = &self.accumulator {
             list.push(("accumulator", resources.memory_use()));
         }

@@ -6,16 +6,17 @@
 //! should stand.
 
 use super::env_map_placement::{EnvMapPlacement, PlacementInputs, SelectionContext, Work};
+use super::indirect_scene::{IndirectScene, PhotonInputs, PhotonPasses};
 use super::{Plan, Settings, Stage};
 use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, DirectLight, DirectLightInputs,
-    DirectLightResources, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapSelector, GBufferCapture,
-    GBufferCaptureInputs, ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, NearestOccluder,
-    NearestOccluderInputs, NearestOccluderResources, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources,
-    PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, ShadowMapCapture, ShadowMapCaptureInputs,
-    ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources, Upsampler, UpsamplerInputs,
-    UpsamplerResources,
+    DirectLightResources, EnvMapSelector, GBufferCapture, GBufferCaptureInputs, NearestOccluder, NearestOccluderInputs,
+    NearestOccluderResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, ShadowMapCapture,
+    ShadowMapCaptureInputs, ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources, Upsampler,
+    UpsamplerInputs, UpsamplerResources,
 };
+#[cfg(feature = "bvh")]
+use crate::resource::BvhGeometry;
 use crate::resource::{
     CameraView, CapturePurpose, CaptureView, EnvMaps, GBuffer, Geometry, Irradiance, Lights, NearestOccluders, Photons,
     PrepareContext, Radiance, ShadowMaps, Subsampling, Visibility,
@@ -54,9 +55,7 @@ struct Passes {
     soft_shadow: SoftShadow,
     direct_light: DirectLight,
     env_map_selector: EnvMapSelector,
-    env_map_capture: EnvMapCapture,
-    photon_emitter: PhotonEmitter,
-    image_space_tracer: ImageSpaceTracer,
+    photons: PhotonPasses,
     photon_splatter: PhotonSplatter,
     upsampler: Upsampler,
     composite: Composite,
@@ -82,16 +81,6 @@ struct DirectScene {
     capture: ShadowMapCaptureResources,
     /// While a light has an extent.
     soft: Option<(NearestOccluders, NearestOccluderResources)>,
-}
-
-/// Allocated while there is indirect light.
-#[derive(Debug)]
-struct IndirectScene {
-    env_maps: EnvMaps,
-    capture: EnvMapCaptureResources,
-    photons: Photons,
-    emitter: PhotonEmitterResources,
-    tracer: ImageSpaceTracerResources,
 }
 
 /// Resources of one view.
@@ -125,6 +114,9 @@ pub struct SceneInputs<'a> {
     pub queue: &'a wgpu::Queue,
     /// The geometry that was prepared.
     pub geometry: &'a dyn Geometry,
+    /// The same geometry as triangles, prepared for this frame: what [`Stage::BvhTracer`] needs while it is on.
+    #[cfg(feature = "bvh")]
+    pub bvh: Option<&'a BvhGeometry>,
     /// First index into the random sequence: constant in real time; advanced by the number of photons per frame when
     /// accumulating.
     pub sample_offset: u32,
@@ -172,9 +164,7 @@ impl GiRenderer {
             soft_shadow: SoftShadow::new(device),
             direct_light: DirectLight::new(device),
             env_map_selector: EnvMapSelector::new(device),
-            env_map_capture: EnvMapCapture::new(),
-            photon_emitter: PhotonEmitter::new(device),
-            image_space_tracer: ImageSpaceTracer::new(device),
+            photons: PhotonPasses::new(device, settings.tracer_kind),
             photon_splatter: PhotonSplatter::new(device, &settings.splatter_config)?,
             upsampler: Upsampler::new(device),
             composite: Composite::new(device, wgpu::TextureFormat::Rgba32Float),
@@ -230,7 +220,8 @@ impl GiRenderer {
         }
         if let Some(state) = &self.state {
             let context = selection_context(&self.device, queue, &self.settings, state);
-            self.placement.follow(&context, self.indirect.is_some())?;
+            let is_needed = state.plan.is_on(Stage::EnvMapSelector);
+            self.placement.follow(&context, is_needed)?;
         }
         self.apply_centers(queue)?;
         Ok(frame)
@@ -247,7 +238,7 @@ impl GiRenderer {
         {
             self.generation = next_generation();
             if let Some(indirect) = &mut self.indirect {
-                indirect.emitter = PhotonEmitterResources::new(device)?;
+                indirect.renew_emitter(device)?;
             }
             self.direct = Some(DirectScene {
                 lights: Lights::new(device)?,
@@ -265,48 +256,44 @@ impl GiRenderer {
                 direct.soft = Some((nearest, NearestOccluderResources::new(device)?));
             }
         }
-        if !plan.is_on(Stage::ImageSpaceTracer) {
+        if !plan.is_on(Stage::PhotonEmitter) {
             self.indirect = None;
         } else if self.indirect.is_none() {
             PhotonSplatterResources::check(device, &settings.splatter_config, settings.photons, settings.bounces)?;
             self.generation = next_generation();
-            self.indirect = Some(IndirectScene {
-                env_maps: EnvMaps::new(device, settings.env_map_count, settings.env_map_size)?,
-                capture: EnvMapCaptureResources::new(device, settings.env_map_size)?,
-                photons: Photons::new(device, settings.photons, settings.bounces)?,
-                emitter: PhotonEmitterResources::new(device)?,
-                tracer: ImageSpaceTracerResources::new(device)?,
-            });
+            self.indirect = Some(IndirectScene::new(device, settings)?);
         }
         Ok(())
     }
 
     /// Writes the centres of the environment maps in the current frame.
     fn apply_centers(&mut self, queue: &wgpu::Queue) -> Result<(), Error> {
-        let (Some(state), Some(indirect)) = (&self.state, &mut self.indirect) else {
+        let env_maps = self.indirect.as_mut().and_then(IndirectScene::env_maps_mut);
+        let (Some(state), Some(env_maps)) = (&self.state, env_maps) else {
             return Ok(());
         };
         let context = selection_context(&self.device, queue, &self.settings, state);
-        indirect.env_maps.set_centers(queue, &self.placement.centers(&context))
+        env_maps.set_centers(queue, &self.placement.centers(&context))
     }
 
     /// As `apply_centers`, for new places: maps there are switched on, and what was planned for the selection is void.
     fn renew_centers(&mut self, queue: &wgpu::Queue) -> Result<(), Error> {
         self.selection = None;
-        if let Some(indirect) = &mut self.indirect {
-            indirect.env_maps.forget_centers();
+        if let Some(env_maps) = self.indirect.as_mut().and_then(IndirectScene::env_maps_mut) {
+            env_maps.forget_centers();
         }
         self.apply_centers(queue)
     }
 
     /// Selects places for the environment maps. Submits and waits: for headless use and loading screens. Without it the
     /// selection begins with the first frame and arrives some frames later. It prepares the geometry for views of its own:
-    /// call it after `set_scene` and before `prepare`.
+    /// call it after `set_scene` and before `prepare`. Does nothing where the settings trace triangles alone.
     ///
     /// # Errors
     /// [`Error::ReadBack`], [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
     pub fn place_env_maps_blocking(&mut self, queue: &wgpu::Queue, geometry: &mut dyn Geometry) -> Result<(), Error> {
-        let Some(state) = &self.state else {
+        let has_maps = self.settings.tracer_kind.uses_env_maps();
+        let Some(state) = self.state.as_ref().filter(|_| has_maps) else {
             return Ok(());
         };
         let context = selection_context(&self.device, queue, &self.settings, state);
@@ -366,8 +353,8 @@ impl GiRenderer {
             self.views.extend(direct.shadow_maps.views(&state.frame, &state.lights));
         }
         let maps_from = self.views.len();
-        if let Some(indirect) = &self.indirect {
-            self.views.extend(indirect.env_maps.views(CapturePurpose::EnvMap));
+        if let Some(env_maps) = self.indirect.as_ref().and_then(IndirectScene::env_maps) {
+            self.views.extend(env_maps.views(CapturePurpose::EnvMap));
         }
         let selection_from = self.views.len();
         let work = self
@@ -389,7 +376,40 @@ impl GiRenderer {
     }
 
     /// Records what all views share: shadow maps, environment maps, photons.
-    pub fn record_scene(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) {
+    ///
+    /// # Errors
+    /// [`Error::MissingInput`] if [`Stage::BvhTracer`] is on and no triangles are given. Nothing is recorded then.
+    pub fn record_scene(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) -> Result<(), Error> {
+        #[cfg(feature = "bvh")]
+        self.check_triangles(inputs)?;
+        self.record_shadow_maps(encoder, inputs);
+        self.record_selection(encoder, inputs);
+        if let (Some(direct), Some(indirect)) = (&self.direct, &mut self.indirect) {
+            let photon_inputs = PhotonInputs {
+                scene: inputs,
+                settings: &self.settings,
+                lights: &direct.lights,
+                shadow_maps: &direct.shadow_maps,
+                views: &self.views[self.env_map_views.clone()],
+            };
+            indirect.record(encoder, &self.passes.photons, &photon_inputs);
+        }
+        Ok(())
+    }
+
+    #[cfg(feature = "bvh")]
+    fn check_triangles(&self, inputs: &SceneInputs<'_>) -> Result<(), Error> {
+        if inputs.bvh.is_none() && self.plan().is_some_and(|p| p.is_on(Stage::BvhTracer)) {
+            return Err(Error::MissingInput {
+                stage: "BvhTracer",
+                input: "SceneInputs::bvh",
+                remedy: "prepare a BvhGeometry each frame, or choose tracer.kind = image-space",
+            });
+        }
+        Ok(())
+    }
+
+    fn record_shadow_maps(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) {
         let Some(direct) = &mut self.direct else {
             return;
         };
@@ -415,42 +435,6 @@ impl GiRenderer {
             };
             self.passes.nearest_occluder.record(encoder, own, &nearest_inputs);
         }
-        self.record_selection(encoder, inputs);
-        let (Some(direct), Some(indirect)) = (&self.direct, &mut self.indirect) else {
-            return;
-        };
-        let capture_inputs = EnvMapCaptureInputs {
-            env_maps: &indirect.env_maps,
-            geometry: inputs.geometry,
-            views: &self.views[self.env_map_views.clone()],
-            timestamps: inputs.timestamps,
-        };
-        self.passes
-            .env_map_capture
-            .record(encoder, &mut indirect.capture, &capture_inputs);
-        let emitter_inputs = PhotonEmitterInputs {
-            queue: inputs.queue,
-            lights: &direct.lights,
-            shadow_maps: &direct.shadow_maps,
-            photons: &indirect.photons,
-            sample_offset: inputs.sample_offset,
-            timestamps: inputs.timestamps,
-        };
-        self.passes
-            .photon_emitter
-            .record(encoder, &mut indirect.emitter, &emitter_inputs);
-        let tracer_inputs = ImageSpaceTracerInputs {
-            queue: inputs.queue,
-            env_maps: &indirect.env_maps,
-            photons: &indirect.photons,
-            shared: None,
-            sample_offset: inputs.sample_offset,
-            settings: &self.settings.tracer,
-            timestamps: inputs.timestamps,
-        };
-        self.passes
-            .image_space_tracer
-            .record(encoder, &mut indirect.tracer, &tracer_inputs);
     }
 
     /// Records this frame's share of the selection of places for environment maps.
@@ -458,13 +442,14 @@ impl GiRenderer {
         let Some((work, views)) = self.selection.take() else {
             return;
         };
-        if let (Some(state), Some(indirect)) = (&self.state, &self.indirect) {
+        let env_maps = self.indirect.as_ref().and_then(IndirectScene::env_maps);
+        if let (Some(state), Some(env_maps)) = (&self.state, env_maps) {
             let placement_inputs = PlacementInputs {
                 context: &selection_context(&self.device, inputs.queue, &self.settings, state),
                 geometry: inputs.geometry,
                 work: &work,
                 views: &self.views[views],
-                env_maps: &indirect.env_maps,
+                env_maps,
                 timestamps: inputs.timestamps,
             };
             self.placement
@@ -644,9 +629,9 @@ impl GiRenderer {
         self.state.as_ref().map(|s| &s.frame)
     }
 
-    /// Environment maps, while there is indirect light.
+    /// Environment maps, while there is indirect light that is traced through them.
     pub fn env_maps(&self) -> Option<&EnvMaps> {
-        self.indirect.as_ref().map(|i| &i.env_maps)
+        self.indirect.as_ref().and_then(IndirectScene::env_maps)
     }
 
     /// Share, by area, of what valid candidates for environment maps see that the maps in use see; `None` until a
@@ -679,13 +664,10 @@ impl GiRenderer {
             }
         }
         if let Some(indirect) = &self.indirect {
-            list.push((
-                "env_maps",
-                indirect.env_maps.memory_use() + indirect.capture.memory_use(),
-            ));
-            list.push(("env_map_selector", self.placement.memory_use()));
-            list.push(("photons", indirect.photons.memory_use()));
-            list.push(("uniforms", indirect.emitter.memory_use() + indirect.tracer.memory_use()));
+            list.extend(indirect.memory_by_resource());
+            if indirect.env_maps().is_some() {
+                list.push(("env_map_selector", self.placement.memory_use()));
+            }
         }
         list
     }

@@ -3,9 +3,10 @@
 
 mod env_map_placement;
 mod gi_renderer;
+mod indirect_scene;
 mod plan;
 mod settings;
 
 pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};
 pub use plan::{Plan, PlannedStage, Stage};
-pub use settings::Settings;
+pub use settings::{Settings, TracerKind};

@@ -1,6 +1,6 @@
 //! Model only what the scene requires: which stages run, and why.
 
-use super::Settings;
+use super::{Settings, TracerKind};
 use crate::pass::PenumbraSearch;
 use crate::scene::SceneSummary;
 use std::fmt;
@@ -24,8 +24,10 @@ pub enum Stage {
     EnvMapCapture,
     /// Photons from lights.
     PhotonEmitter,
-    /// Photons from surface to surface.
+    /// Photons from surface to surface, as environment maps see them.
     ImageSpaceTracer,
+    /// Photons from triangle to triangle.
+    BvhTracer,
     /// Photons to irradiance.
     PhotonSplatter,
     /// Irradiance of some pixels to all of them.
@@ -88,7 +90,8 @@ impl Plan {
             PenumbraSearch::On => soft.clone(),
             PenumbraSearch::Off => (false, "settings search no occluders".to_owned()),
         };
-        let [selection, maps] = map_reasons(&indirect, settings).map(|reason| (indirect.0, reason));
+        let [selection, maps] = map_stages(&indirect, settings);
+        let [image_space, bvh] = tracers(&indirect, settings);
         let upsampling = upsampling(&indirect, settings);
         Self {
             stages: vec![
@@ -100,7 +103,8 @@ impl Plan {
                 stage(Stage::EnvMapSelector, selection),
                 stage(Stage::EnvMapCapture, maps),
                 stage(Stage::PhotonEmitter, indirect.clone()),
-                stage(Stage::ImageSpaceTracer, indirect.clone()),
+                stage(Stage::ImageSpaceTracer, image_space),
+                stage(Stage::BvhTracer, bvh),
                 stage(Stage::PhotonSplatter, indirect),
                 stage(Stage::Upsampler, upsampling),
                 stage(Stage::CausticPhotons, (false, caustics)),
@@ -140,19 +144,35 @@ fn indirect(summary: &SceneSummary, settings: &Settings) -> (bool, String) {
     }
 }
 
-/// Of the selection of places for environment maps, and of their capture.
-fn map_reasons(indirect: &(bool, String), settings: &Settings) -> [String; 2] {
+/// The selection of places for environment maps, and their capture.
+fn map_stages(indirect: &(bool, String), settings: &Settings) -> [(bool, String); 2] {
     if !indirect.0 {
-        return [indirect.1.clone(), indirect.1.clone()];
+        return [indirect.clone(), indirect.clone()];
+    }
+    if !settings.tracer_kind.uses_env_maps() {
+        return ["rays meet triangles"; 2].map(|reason| (false, reason.to_owned()));
     }
     let (most, size) = (settings.env_map_count, settings.env_map_size);
+    let candidates = settings.selector.candidates.max(most);
     [
-        format!(
-            "of {} candidates, and while geometry changes",
-            settings.selector.candidates.max(most)
-        ),
+        format!("of {candidates} candidates, and while geometry changes"),
         format!("at most {most} maps of 6 × {size}²"),
     ]
+    .map(|reason| (true, reason))
+}
+
+/// The tracer in image space, and that of triangles.
+fn tracers(indirect: &(bool, String), settings: &Settings) -> [(bool, String); 2] {
+    if !indirect.0 {
+        return [indirect.clone(), indirect.clone()];
+    }
+    let all = indirect.1.as_str();
+    let [image_space, bvh] = match settings.tracer_kind {
+        TracerKind::ImageSpace => [(true, all), (false, "settings trace in image space")],
+        TracerKind::Bvh => [(false, "settings trace triangles"), (true, all)],
+        TracerKind::Hybrid => [(true, all), (true, "rays that ImageSpaceTracer loses")],
+    };
+    [image_space, bvh].map(|(on, reason)| (on, reason.to_owned()))
 }
 
 fn upsampling(indirect: &(bool, String), settings: &Settings) -> (bool, String) {
@@ -257,6 +277,28 @@ mod tests {
                 ..settings.clone()
             }
         ));
+    }
+
+    #[test]
+    fn only_what_the_chosen_tracer_reads_is_made() {
+        let on = |tracer_kind, lights| {
+            let settings = Settings {
+                tracer_kind,
+                ..Settings::balanced()
+            };
+            let plan = Plan::for_scene(&SceneSummary { lights, ..summary() }, &settings);
+            let stages = [
+                Stage::EnvMapSelector,
+                Stage::EnvMapCapture,
+                Stage::ImageSpaceTracer,
+                Stage::BvhTracer,
+            ];
+            stages.map(|stage| plan.is_on(stage))
+        };
+        assert_eq!(on(TracerKind::ImageSpace, 1), [true, true, true, false]);
+        assert_eq!(on(TracerKind::Bvh, 1), [false, false, false, true]);
+        assert_eq!(on(TracerKind::Hybrid, 1), [true; 4]);
+        assert_eq!(on(TracerKind::Hybrid, 0), [false; 4]);
     }
 
     #[test]

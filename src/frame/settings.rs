@@ -14,6 +14,31 @@ const MAX_BOUNCES: u32 = 64;
 /// Most candidates for environment maps.
 const MAX_CANDIDATES: u32 = EnvMapSelectorResources::MAX_CANDIDATES;
 
+/// What photons are traced through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum TracerKind {
+    /// Environment maps. Whatever can be drawn takes part; what no map sees loses light.
+    #[default]
+    ImageSpace,
+    /// The triangles of a [`BvhGeometry`](crate::resource::BvhGeometry), which the host brings. No ray is lost, and no
+    /// environment map is needed; geometry that is not in the trees does not take part. Feature `bvh`.
+    Bvh,
+    /// Environment maps, and triangles for the rays that these lose. Feature `bvh`.
+    Hybrid,
+}
+
+impl TracerKind {
+    /// Whether it needs environment maps.
+    pub fn uses_env_maps(self) -> bool {
+        self != Self::Bvh
+    }
+
+    /// Whether it needs a [`BvhGeometry`](crate::resource::BvhGeometry).
+    pub fn uses_triangles(self) -> bool {
+        self != Self::ImageSpace
+    }
+}
+
 /// Settings of all stages. Start from a preset and change fields, or [`Settings::set`] them by name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
@@ -36,7 +61,10 @@ pub struct Settings {
     pub soft_shadow: SoftShadowSettings,
     /// Where environment maps are taken from.
     pub selector: EnvMapSelectorSettings,
-    /// How rays are traced: the default method has a quarter of the paper's error at twice its time.
+    /// What photons are traced through.
+    pub tracer_kind: TracerKind,
+    /// How rays are traced in image space: the default method has a quarter of the paper's error at twice its time.
+    /// `roulette_from` counts for every kind of tracer.
     pub tracer: ImageSpaceTracerSettings,
     /// How photons are drawn: tiles in f32, or blended quads.
     pub splatter_config: PhotonSplatterConfig,
@@ -88,6 +116,7 @@ impl Settings {
             shadow_map_size: 512,
             soft_shadow: SoftShadowSettings::default(),
             selector: EnvMapSelectorSettings::default(),
+            tracer_kind: TracerKind::default(),
             tracer: ImageSpaceTracerSettings::default(),
             splatter_config: PhotonSplatterConfig::default(),
             splatter: PhotonSplatterSettings::default(),
@@ -209,6 +238,11 @@ impl Knob {
     }
 }
 
+#[cfg(feature = "bvh")]
+const TRACER_KINDS: &str = "image-space, bvh or hybrid";
+#[cfg(not(feature = "bvh"))]
+const TRACER_KINDS: &str = "image-space (bvh and hybrid need the cargo feature `bvh`)";
+
 /// A knob over a plain field that parses from text.
 macro_rules! field {
     ($name:literal, $expected:literal, $($path:ident).+, $valid:expr) => {
@@ -224,7 +258,7 @@ macro_rules! field {
 
 /// A knob over a field that takes one of a few values, each with a name.
 macro_rules! choice {
-    ($name:literal, $expected:literal, $($path:ident).+, $([$text:literal, $value:expr]),+) => {
+    ($name:literal, $expected:expr, $($path:ident).+, $([$text:literal, $value:expr]),+) => {
         Knob {
             name: $name,
             expected: $expected,
@@ -288,6 +322,17 @@ const KNOBS: &[Knob] = &[
         .contains(&v)),
     field!("selector.interval", "1 to 60 frames", selector.interval, |v| (1..=60)
         .contains(&v)),
+    Knob {
+        is_valid: |s| cfg!(feature = "bvh") || !s.tracer_kind.uses_triangles(),
+        ..choice!(
+            "tracer.kind",
+            TRACER_KINDS,
+            tracer_kind,
+            ["image-space", TracerKind::ImageSpace],
+            ["bvh", TracerKind::Bvh],
+            ["hybrid", TracerKind::Hybrid]
+        )
+    },
     choice!(
         "tracer.method",
         "paper, plane or ordered-march",
@@ -431,6 +476,23 @@ mod tests {
         settings.validate().unwrap();
         settings.set("splatter.photons", "30").unwrap();
         assert_eq!(settings.density_values().0, 30.0);
+    }
+
+    #[test]
+    fn tracers_of_triangles_are_refused_where_the_crate_was_built_without_them() {
+        for name in ["bvh", "hybrid"] {
+            let mut settings = Settings::balanced();
+            let answer = settings.set("tracer.kind", name);
+            if cfg!(feature = "bvh") {
+                answer.unwrap();
+                settings.validate().unwrap();
+            } else {
+                let error = answer.unwrap_err().to_string();
+                assert!(error.contains("feature `bvh`"), "{error}");
+                settings.tracer_kind = TracerKind::Bvh;
+                assert!(settings.validate().is_err());
+            }
+        }
     }
 
     #[test]

@@ -1,0 +1,203 @@
+//! What all views share of indirect light: photons, and what the settings let them meet.
+
+use super::{SceneInputs, Settings, TracerKind};
+use crate::Error;
+#[cfg(feature = "bvh")]
+use crate::pass::{BvhTracer, BvhTracerInputs, BvhTracerResources};
+use crate::pass::{
+    EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources, ImageSpaceTracer, ImageSpaceTracerInputs,
+    ImageSpaceTracerResources, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources, SharedHop,
+};
+use crate::resource::{CaptureView, EnvMaps, Lights, LostRays, Photons, ShadowMaps};
+
+/// From the lights to the last surface.
+#[derive(Debug)]
+pub(super) struct PhotonPasses {
+    env_map_capture: EnvMapCapture,
+    photon_emitter: PhotonEmitter,
+    /// Those that the settings use.
+    image_space_tracer: Option<ImageSpaceTracer>,
+    #[cfg(feature = "bvh")]
+    bvh_tracer: Option<BvhTracer>,
+}
+
+/// Allocated while there is indirect light.
+#[derive(Debug)]
+pub(super) struct IndirectScene {
+    pub(super) photons: Photons,
+    emitter: PhotonEmitterResources,
+    image_space: Option<ImageSpaceScene>,
+    #[cfg(feature = "bvh")]
+    bvh_tracer: Option<BvhTracerResources>,
+    /// While one tracer traces what the other loses.
+    lost: Option<LostRays>,
+}
+
+/// Allocated while rays are traced in image space.
+#[derive(Debug)]
+struct ImageSpaceScene {
+    env_maps: EnvMaps,
+    capture: EnvMapCaptureResources,
+    tracer: ImageSpaceTracerResources,
+}
+
+/// What recording needs beside a host's inputs.
+#[derive(Clone, Copy)]
+pub(super) struct PhotonInputs<'a> {
+    pub(super) scene: &'a SceneInputs<'a>,
+    pub(super) settings: &'a Settings,
+    pub(super) lights: &'a Lights,
+    pub(super) shadow_maps: &'a ShadowMaps,
+    /// Of the environment maps.
+    pub(super) views: &'a [CaptureView],
+}
+
+impl PhotonPasses {
+    pub(super) fn new(device: &wgpu::Device, kind: TracerKind) -> Self {
+        Self {
+            env_map_capture: EnvMapCapture::new(),
+            photon_emitter: PhotonEmitter::new(device),
+            image_space_tracer: kind.uses_env_maps().then(|| ImageSpaceTracer::new(device)),
+            #[cfg(feature = "bvh")]
+            bvh_tracer: kind.uses_triangles().then(|| BvhTracer::new(device)),
+        }
+    }
+}
+
+impl IndirectScene {
+    pub(super) fn new(device: &wgpu::Device, settings: &Settings) -> Result<Self, Error> {
+        let kind = settings.tracer_kind;
+        let is_shared = kind == TracerKind::Hybrid;
+        let shared_hops = if is_shared { settings.bounces } else { 0 };
+        let photons = Photons::new(device, settings.photons, settings.bounces)?;
+        let image_space = || {
+            Ok(ImageSpaceScene {
+                env_maps: EnvMaps::new(device, settings.env_map_count, settings.env_map_size)?,
+                capture: EnvMapCaptureResources::new(device, settings.env_map_size)?,
+                tracer: ImageSpaceTracerResources::for_shared_hops(device, shared_hops)?,
+            })
+        };
+        Ok(Self {
+            emitter: PhotonEmitterResources::new(device)?,
+            image_space: kind.uses_env_maps().then(image_space).transpose()?,
+            #[cfg(feature = "bvh")]
+            bvh_tracer: kind
+                .uses_triangles()
+                .then(|| BvhTracerResources::for_shared_hops(device, shared_hops))
+                .transpose()?,
+            lost: is_shared.then(|| LostRays::new(device, &photons)).transpose()?,
+            photons,
+        })
+    }
+
+    /// Forgets lights and shadow maps that are no more.
+    pub(super) fn renew_emitter(&mut self, device: &wgpu::Device) -> Result<(), Error> {
+        self.emitter = PhotonEmitterResources::new(device)?;
+        Ok(())
+    }
+
+    pub(super) fn env_maps(&self) -> Option<&EnvMaps> {
+        self.image_space.as_ref().map(|i| &i.env_maps)
+    }
+
+    pub(super) fn env_maps_mut(&mut self) -> Option<&mut EnvMaps> {
+        self.image_space.as_mut().map(|i| &mut i.env_maps)
+    }
+
+    /// Records the capture of what photons meet, their emission and their walk.
+    pub(super) fn record(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        passes: &PhotonPasses,
+        inputs: &PhotonInputs<'_>,
+    ) {
+        let scene = inputs.scene;
+        if let Some(image_space) = &mut self.image_space {
+            let capture_inputs = EnvMapCaptureInputs {
+                env_maps: &image_space.env_maps,
+                geometry: scene.geometry,
+                views: inputs.views,
+                timestamps: scene.timestamps,
+            };
+            passes
+                .env_map_capture
+                .record(encoder, &mut image_space.capture, &capture_inputs);
+        }
+        let emitter_inputs = PhotonEmitterInputs {
+            queue: scene.queue,
+            lights: inputs.lights,
+            shadow_maps: inputs.shadow_maps,
+            photons: &self.photons,
+            sample_offset: scene.sample_offset,
+            timestamps: scene.timestamps,
+        };
+        passes
+            .photon_emitter
+            .record(encoder, &mut self.emitter, &emitter_inputs);
+        if self.lost.is_none() {
+            self.record_walk(encoder, passes, inputs, None);
+            return;
+        }
+        for hop in 1..=self.photons.bounces() {
+            self.record_walk(encoder, passes, inputs, Some(hop));
+        }
+    }
+
+    /// Of each tracer that there is, the whole walk or one hop.
+    fn record_walk(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        passes: &PhotonPasses,
+        inputs: &PhotonInputs<'_>,
+        hop: Option<u32>,
+    ) {
+        let scene = inputs.scene;
+        let lost = self.lost.as_ref();
+        let shared = hop.zip(lost).map(|(number, lost)| SharedHop { number, lost });
+        if let (Some(tracer), Some(image_space)) = (&passes.image_space_tracer, &mut self.image_space) {
+            let tracer_inputs = ImageSpaceTracerInputs {
+                queue: scene.queue,
+                env_maps: &image_space.env_maps,
+                photons: &self.photons,
+                shared,
+                sample_offset: scene.sample_offset,
+                settings: &inputs.settings.tracer,
+                timestamps: scene.timestamps,
+            };
+            tracer.record(encoder, &mut image_space.tracer, &tracer_inputs);
+        }
+        #[cfg(feature = "bvh")]
+        if let (Some(tracer), Some(own), Some(geometry)) = (&passes.bvh_tracer, &mut self.bvh_tracer, scene.bvh) {
+            let tracer_inputs = BvhTracerInputs {
+                queue: scene.queue,
+                geometry,
+                photons: &self.photons,
+                shared,
+                sample_offset: scene.sample_offset,
+                roulette_from: inputs.settings.tracer.roulette_from,
+                timestamps: scene.timestamps,
+            };
+            tracer.record(encoder, own, &tracer_inputs);
+        }
+    }
+
+    /// Bytes by resource.
+    pub(super) fn memory_by_resource(&self) -> Vec<(&'static str, u64)> {
+        let mut uniforms = self.emitter.memory_use();
+        let mut list = vec![("photons", self.photons.memory_use())];
+        if let Some(image_space) = &self.image_space {
+            let maps = image_space.env_maps.memory_use() + image_space.capture.memory_use();
+            list.push(("env_maps", maps));
+            uniforms += image_space.tracer.memory_use();
+        }
+        #[cfg(feature = "bvh")]
+        if let Some(tracer) = &self.bvh_tracer {
+            uniforms += tracer.memory_use();
+        }
+        if let Some(lost) = &self.lost {
+            list.push(("lost_rays", lost.memory_use()));
+        }
+        list.push(("uniforms", uniforms));
+        list
+    }
+}
