@@ -37,10 +37,11 @@ enum Part {
 
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Tracer {
+    /// Through environment maps.
     ImageSpace,
-    /// Not available yet.
+    /// Against triangles.
     Bvh,
-    /// Not available yet.
+    /// Through environment maps, and against triangles what these lose.
     Hybrid,
 }
 
@@ -57,7 +58,7 @@ enum Method {
 #[derive(Parser)]
 #[command(
     args_override_self = true,
-    after_help = "Not available yet: --component caustic|specular but for --preset reference, --tracer bvh|hybrid, \
+    after_help = "Not available yet: --component caustic|specular but for --preset reference, \
     --method surface-lights|illumination-maps, --budget-ms, glTF skins."
 )]
 struct Arguments {
@@ -82,9 +83,9 @@ struct Arguments {
     /// Surfaces that light scatters at before the one the eye sees (default: the preset's)
     #[arg(long)]
     bounces: Option<u32>,
-    /// How photons find what they hit
-    #[arg(long, value_enum, default_value = "image-space")]
-    tracer: Tracer,
+    /// How photons find what they hit (default: the preset's)
+    #[arg(long, value_enum)]
+    tracer: Option<Tracer>,
     /// How indirect light is represented
     #[arg(long, value_enum, default_value = "splatting")]
     method: Method,
@@ -334,9 +335,6 @@ fn check_available(arguments: &Arguments) -> Result<Component, String> {
     if arguments.budget_ms.is_some() {
         return not_yet("--budget-ms");
     }
-    if arguments.tracer != Tracer::ImageSpace {
-        return not_yet("--tracer bvh and hybrid");
-    }
     if arguments.method != Method::Splatting {
         return not_yet("--method surface-lights and illumination-maps");
     }
@@ -361,6 +359,9 @@ fn settings(arguments: &Arguments) -> Result<Settings, String> {
             .split_once('=')
             .ok_or_else(|| format!("--set {pair:?}: expected KEY=VALUE"))?;
         set(key.trim(), value.trim())?;
+    }
+    if let Some(tracer) = arguments.tracer.and_then(|t| t.to_possible_value()) {
+        set("tracer.kind", tracer.get_name())?;
     }
     if let Some(bounces) = arguments.bounces {
         set("bounces", &bounces.to_string())?;
@@ -485,7 +486,11 @@ fn report(
         },
         "energy": energy,
         "env_maps": {
-            "candidates": settings.selector.candidates.max(settings.env_map_count),
+            "candidates": if offline.renderer.env_maps().is_some() {
+                settings.selector.candidates.max(settings.env_map_count)
+            } else {
+                0
+            },
             "used": offline.renderer.env_maps().map_or(0, |m| m.centers().len()),
             "coverage": offline.renderer.env_map_coverage(),
         },

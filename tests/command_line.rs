@@ -79,8 +79,11 @@ fn bad_input_gets_one_line_status_two_and_no_file() {
         (&["sample:cornell", "--preset", "reference"], "not available yet"),
         (&["sample:cornell", "--component", "caustic"], "not available yet"),
         (&["sample:cornell", "--component", "specular"], "not available yet"),
-        (&["sample:cornell", "--tracer", "bvh"], "not available yet"),
-        (&["sample:cornell", "--tracer", "hybrid"], "not available yet"),
+        (&["sample:cornell", "--tracer", "fastest"], "--tracer"),
+        (
+            &["sample:cornell", "--set", "tracer.kind=none"],
+            "image-space, bvh or hybrid",
+        ),
         (&["sample:cornell", "--method", "surface-lights"], "not available yet"),
         (
             &["sample:cornell", "--method", "illumination-maps"],
@@ -134,7 +137,7 @@ fn help_lists_what_is_not_available_yet() {
     let output = render().arg("--help").output().unwrap();
     assert!(output.status.success());
     let text = String::from_utf8(output.stdout).unwrap();
-    for option in ["Not available yet", "bvh", "caustic", "surface-lights", "--budget-ms"] {
+    for option in ["Not available yet", "caustic", "surface-lights", "--budget-ms"] {
         assert!(text.contains(option), "{option}");
     }
 }
@@ -187,7 +190,7 @@ fn images_and_statistics_are_written_whole() {
         .map(|v| v.as_u64().unwrap())
         .sum();
     assert_eq!(bytes["total"].as_u64().unwrap(), sum);
-    assert_eq!(stats["plan"].as_array().unwrap().len(), 13);
+    assert_eq!(stats["plan"].as_array().unwrap().len(), 14);
     // Of a scene in motion, with a lamp that casts penumbrae.
     render_to_penumbra(&path("p.json"));
     let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(path("p.json")).unwrap()).unwrap();
