@@ -20,8 +20,8 @@ pub enum TracerKind {
     /// Environment maps. Whatever can be drawn takes part; what no map sees loses light.
     #[default]
     ImageSpace,
-    /// The triangles of a [`BvhGeometry`](crate::resource::BvhGeometry), which the host brings. No ray is lost, and no
-    /// environment map is needed; geometry that is not in the trees does not take part. Feature `bvh`.
+    /// The triangles of a `BvhGeometry`, which the host brings. No ray is lost, and no environment map is needed; geometry
+    /// that is not in the trees does not take part. Feature `bvh`.
     Bvh,
     /// Environment maps, and triangles for the rays that these lose. Feature `bvh`.
     Hybrid,
@@ -33,7 +33,7 @@ impl TracerKind {
         self != Self::Bvh
     }
 
-    /// Whether it needs a [`BvhGeometry`](crate::resource::BvhGeometry).
+    /// Whether it needs a `BvhGeometry`.
     pub fn uses_triangles(self) -> bool {
         self != Self::ImageSpace
     }
