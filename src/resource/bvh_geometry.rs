@@ -1,12 +1,13 @@
 //! Meshes, instances and materials of a [`Scene`] as rays meet them: a tree of triangles for each mesh under a tree of
 //! instances.
 
-use super::bvh_mesh::{self, BvhMesh, TOP_LEVELS, build_tree, check_depth};
+use super::bvh_mesh::{self, BvhMesh, TOP_LEVELS};
+use super::bvh_tree::{Tree, fit};
 use super::texture_arrays::TextureArrays;
 use crate::gpu::{self as device, Bound, Slot};
 use crate::scene::{Instance, Material, Scene, UnitFrame};
 use crate::{Error, resource};
-use glam::{DAffine3, DMat3, Vec3};
+use glam::{BVec3A, DAffine3, DMat3, Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::cwbvh::node::CwBvhNode;
 
@@ -86,8 +87,7 @@ impl Default for BvhGeometryConfig {
 
 /// A scene's triangles on the GPU, for rays.
 ///
-/// A tree of eight-wide compressed nodes (Ylitie et al. 2017, built by `obvhs`) for each mesh, and one over the
-/// instances. Bytes on the GPU: 80 a triangle (three corners of position and normal; texture coordinates), 80 a node, of
+/// A tree of eight-wide compressed nodes (Ylitie et al. 2017) for each mesh, and one over the instances. Bytes on the GPU: 80 a triangle (three corners of position and normal; texture coordinates), 80 a node, of
 /// which a mesh has about one for six triangles, 128 an instance, 64 a material; on the CPU 12 a triangle and 80 a node.
 /// An instance whose transform is singular has no inside to trace in, so rays do not see it.
 #[derive(Debug)]
@@ -266,9 +266,9 @@ impl BvhGeometry {
             .zip(&placed)
             .filter_map(|(index, (_, bounds))| bounds.map(|b| (index, b)))
             .unzip();
-        let tree = build_tree(&boxes);
-        check_depth(&tree, TOP_LEVELS, || format!("{} instances", boxes.len()))?;
-        for (leaf, &seen_index) in tree.primitive_indices.iter().enumerate() {
+        let mut tree = Tree::over(boxes.iter().copied(), TOP_LEVELS, || "the instances".into())?;
+        fit(&mut tree.nodes, |place| boxes[tree.order[place] as usize]);
+        for (leaf, &seen_index) in tree.order.iter().enumerate() {
             records[leaf].leaf = seen[seen_index as usize];
         }
         let mut uploaded = 0;
@@ -379,10 +379,10 @@ impl BvhGeometry {
             leaf: 0,
         };
         let is_invertible = to_mesh.is_finite() && record.to_mesh.iter().flatten().all(|x| x.is_finite());
-        let bounds = place.mesh.bounds.filter(|_| is_invertible).map(|(min, max)| {
-            let corner = |i: usize| Vec3::select(glam::BVec3::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), max, min);
+        let bounds = place.mesh.bounds.filter(|_| is_invertible).map(|Aabb { min, max }| {
+            let corner = |i: usize| Vec3A::select(BVec3A::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), max, min);
             let points: [_; 8] = std::array::from_fn(|i| {
-                let p = to_unit * corner(i).as_dvec3() + center.as_dvec3();
+                let p = to_unit * Vec3::from(corner(i)).as_dvec3() + center.as_dvec3();
                 p.as_vec3a()
             });
             padded(Aabb::from_points(&points))

@@ -1,23 +1,20 @@
 //! One mesh as rays meet it: triangles in the order of the leaves of a compressed wide tree.
 
+use super::bvh_tree::{Tree, fit};
 use crate::Error;
 use crate::scene::Mesh;
 use glam::{DVec3, Vec3};
-use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
-use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::cwbvh::node::CwBvhNode;
 use std::collections::HashMap;
-use std::time::Duration;
 
 /// Groups of nodes that a ray may have to come back to: at most one for each level but the last, and one for the
 /// instances left of a leaf. Twin of `BVH_STACK`.
-pub(crate) const STACK: usize = 32;
+pub(crate) const STACK: u32 = 32;
 /// Levels of the tree of instances.
-pub(crate) const TOP_LEVELS: usize = 10;
+pub(crate) const TOP_LEVELS: u32 = 10;
 /// Levels of the tree of a mesh.
-const MESH_LEVELS: usize = STACK - TOP_LEVELS;
+const MESH_LEVELS: u32 = STACK - TOP_LEVELS;
 
 /// Twin of `BVH_NO_NORMAL`: a bit pattern that packing a unit vector never gives.
 const NO_NORMAL: u32 = 0x8000_8000;
@@ -86,8 +83,8 @@ pub(crate) struct BvhMesh {
     /// Vertices of each triangle in leaf order; corners ordered so that two triangles that share an edge name its ends
     /// in the same order. 12 bytes a triangle, kept for refitting.
     corners: Vec<[u32; 3]>,
-    /// Bounds in the mesh's frame; `None` without triangles.
-    pub(crate) bounds: Option<(Vec3, Vec3)>,
+    /// In the mesh's frame; `None` without triangles.
+    pub(crate) bounds: Option<Aabb>,
     vertex_count: usize,
 }
 
@@ -98,22 +95,19 @@ pub(crate) struct MeshUpload {
 }
 
 impl BvhMesh {
-    /// Builds the tree. Transient memory: 32 bytes a triangle for its bounds and what `obvhs` takes.
+    /// Builds the tree.
     pub(crate) fn build(mesh: &Mesh) -> Result<(Self, MeshUpload), Error> {
-        let count = mesh.indices.len() / 3;
         let frame = MeshFrame::of(&mesh.positions);
-        let place = |vertex: u32| frame.place(mesh.positions[vertex as usize]);
-        let boxes: Vec<_> = mesh
+        let place = |&vertex: &u32| frame.place(mesh.positions[vertex as usize]);
+        let boxes = mesh
             .indices
             .chunks_exact(3)
-            .map(|t| Aabb::from_points(&[place(t[0]).into(), place(t[1]).into(), place(t[2]).into()]))
-            .collect();
-        let tree = build_tree(&boxes);
-        check_depth(&tree, MESH_LEVELS, || format!("mesh {:?}", mesh.name))?;
+            .map(|t| around([0, 1, 2].map(|k| place(&t[k]))));
+        let tree = Tree::over(boxes, MESH_LEVELS, || format!("mesh {:?}", mesh.name))?;
         let ranks = Ranks::of(&mesh.positions);
-        let mut corners = Vec::with_capacity(count);
-        let mut attributes = Vec::with_capacity(count);
-        for &triangle in &tree.primitive_indices {
+        let mut corners = Vec::with_capacity(tree.order.len());
+        let mut attributes = Vec::with_capacity(tree.order.len());
+        for &triangle in &tree.order {
             let first = 3 * triangle as usize;
             let own = [mesh.indices[first], mesh.indices[first + 1], mesh.indices[first + 2]];
             let slots = ranks.order(own);
@@ -133,12 +127,8 @@ impl BvhMesh {
             bounds: None,
             vertex_count: mesh.positions.len(),
         };
-        built.bounds = (count > 0).then(|| (tree.total_aabb.min.into(), tree.total_aabb.max.into()));
-        let upload = MeshUpload {
-            corners: built.placed_corners(&mesh.positions, &mesh.normals),
-            attributes,
-        };
-        Ok((built, upload))
+        let corners = built.refit(&mesh.positions, &mesh.normals);
+        Ok((built, MeshUpload { corners, attributes }))
     }
 
     /// Triangles.
@@ -169,57 +159,15 @@ impl BvhMesh {
     pub(crate) fn refit(&mut self, positions: &[[f32; 3]], normals: &[[f32; 3]]) -> Vec<gpu::Corner> {
         self.frame = MeshFrame::of(positions);
         let corners = self.placed_corners(positions, normals);
-        let mut bounds = vec![Bounds::EMPTY; self.nodes.len()];
-        // Children stand behind their parents.
-        for index in (0..self.nodes.len()).rev() {
-            let children = child_bounds(&self.nodes[index], &corners, &bounds);
-            bounds[index] = children
-                .iter()
-                .flatten()
-                .copied()
-                .fold(Bounds::EMPTY, |all, one| Bounds {
-                    min: all.min.min(one.min),
-                    max: all.max.max(one.max),
-                });
-            quantise(&mut self.nodes[index], &bounds[index], &children);
-        }
-        if self.bounds.is_some() {
-            self.bounds = Some((bounds[0].min, bounds[0].max));
-        }
+        self.bounds = fit(&mut self.nodes, |place| {
+            around([0, 1, 2].map(|k| corners[3 * place + k].position.into()))
+        });
         corners
     }
 }
 
-/// A tree over boxes. `obvhs` builds it by parallel locally-ordered clustering, reinserts a twentieth of its nodes, and
-/// collapses it into nodes of eight (Ylitie et al. 2017).
-pub(crate) fn build_tree(boxes: &[Aabb]) -> CwBvh {
-    if boxes.is_empty() {
-        return CwBvh {
-            nodes: vec![CwBvhNode::default()],
-            ..Default::default()
-        };
-    }
-    build_cwbvh(boxes, BvhBuildParams::medium_build(), &mut Duration::default())
-}
-
-/// Refuses a tree that is deeper than the rays' stack.
-pub(crate) fn check_depth(tree: &CwBvh, levels: usize, what: impl Fn() -> String) -> Result<(), Error> {
-    let mut depths = vec![0usize; tree.nodes.len()];
-    for (index, node) in tree.nodes.iter().enumerate() {
-        for child in 0..node.imask.count_ones() {
-            depths[(node.child_base_idx + child) as usize] = depths[index] + 1;
-        }
-    }
-    let deepest = depths.iter().max().map_or(0, |d| d + 1);
-    if deepest > levels {
-        return Err(Error::LimitExceeded {
-            what: format!("the tree over {}", what()),
-            needed: deepest as u64,
-            limit: levels as u64,
-            remedy: "split it, or spread what lies in one place",
-        });
-    }
-    Ok(())
+fn around(corners: [Vec3; 3]) -> Aabb {
+    Aabb::from_points(&corners.map(Into::into))
 }
 
 /// Which of two vertices comes first along an edge. Vertices in the same place have the same rank, so that triangles
@@ -267,74 +215,5 @@ fn pack_normal(normal: [f32; 3]) -> u32 {
         super::Photon::pack_unit_vector((normal / length).as_vec3())
     } else {
         NO_NORMAL
-    }
-}
-
-#[derive(Debug, Clone, Copy)]
-struct Bounds {
-    min: Vec3,
-    max: Vec3,
-}
-
-impl Bounds {
-    const EMPTY: Self = Self {
-        min: Vec3::INFINITY,
-        max: Vec3::NEG_INFINITY,
-    };
-}
-
-/// Bounds of each child of a node; `None` where there is none.
-fn child_bounds(node: &CwBvhNode, corners: &[gpu::Corner], nodes: &[Bounds]) -> [Option<Bounds>; 8] {
-    std::array::from_fn(|child| {
-        let meta = u32::from(node.child_meta[child]);
-        if meta == 0 {
-            return None;
-        }
-        if node.imask >> child & 1 == 1 {
-            let before = (u32::from(node.imask) & ((1 << child) - 1)).count_ones();
-            return Some(nodes[(node.child_base_idx + before) as usize]);
-        }
-        let first = (node.primitive_base_idx + (meta & 31)) as usize;
-        let count = (meta >> 5).count_ones() as usize;
-        let points = corners[3 * first..3 * (first + count)]
-            .iter()
-            .map(|c| Vec3::from(c.position));
-        Some(points.fold(Bounds::EMPTY, |all, p| Bounds {
-            min: all.min.min(p),
-            max: all.max.max(p),
-        }))
-    })
-}
-
-/// Writes bounds into a node: its lower corner, a power of two for each axis, and eight bits for each plane of each child,
-/// rounded outward.
-fn quantise(node: &mut CwBvhNode, bounds: &Bounds, children: &[Option<Bounds>; 8]) {
-    const STEPS: f32 = 255.0;
-    const SMALLEST: f32 = 1e-20;
-    if bounds.min.x > bounds.max.x {
-        return;
-    }
-    let steps = ((bounds.max - bounds.min).max(Vec3::splat(SMALLEST)) / STEPS).map(|s| s.log2().ceil().exp2());
-    node.p = bounds.min;
-    node.e = steps.to_array().map(|s| (s.to_bits() >> 23) as u8);
-    for (child, bounds_of_child) in children.iter().enumerate() {
-        let Some(of_child) = bounds_of_child else {
-            continue;
-        };
-        let low = ((of_child.min - node.p) / steps)
-            .floor()
-            .clamp(Vec3::ZERO, Vec3::splat(STEPS));
-        let high = ((of_child.max - node.p) / steps)
-            .ceil()
-            .clamp(Vec3::ZERO, Vec3::splat(STEPS));
-        let planes = [
-            (&mut node.child_min_x, &mut node.child_max_x, low.x, high.x),
-            (&mut node.child_min_y, &mut node.child_max_y, low.y, high.y),
-            (&mut node.child_min_z, &mut node.child_max_z, low.z, high.z),
-        ];
-        for (min, max, low, high) in planes {
-            min[child] = low as u8;
-            max[child] = high as u8;
-        }
     }
 }

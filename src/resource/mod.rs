@@ -7,6 +7,8 @@
 pub(crate) mod bvh_geometry;
 #[cfg(feature = "bvh")]
 pub(crate) mod bvh_mesh;
+#[cfg(feature = "bvh")]
+mod bvh_tree;
 pub mod cube_face;
 mod env_maps;
 pub(crate) mod g_buffer;
