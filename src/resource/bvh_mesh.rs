@@ -6,7 +6,7 @@ use crate::scene::Mesh;
 use glam::{DVec3, Vec3};
 use obvhs::aabb::Aabb;
 use obvhs::cwbvh::node::CwBvhNode;
-use std::collections::HashMap;
+use std::cmp::Ordering;
 
 /// Groups of nodes that a ray may have to come back to: at most one for each level but the last, and one for the
 /// instances left of a leaf. Twin of `BVH_STACK`.
@@ -80,8 +80,8 @@ impl MeshFrame {
 pub(crate) struct BvhMesh {
     pub(crate) frame: MeshFrame,
     pub(crate) nodes: Vec<CwBvhNode>,
-    /// Vertices of each triangle in leaf order; corners ordered so that two triangles that share an edge name its ends
-    /// in the same order. 12 bytes a triangle, kept for refitting.
+    /// Vertices of each triangle in leaf order, in the order of [`corner_order`] when the tree was built. 12 bytes a
+    /// triangle, kept for refitting.
     corners: Vec<[u32; 3]>,
     /// In the mesh's frame; `None` without triangles.
     pub(crate) bounds: Option<Aabb>,
@@ -98,19 +98,17 @@ impl BvhMesh {
     /// Builds the tree.
     pub(crate) fn build(mesh: &Mesh) -> Result<(Self, MeshUpload), Error> {
         let frame = MeshFrame::of(&mesh.positions);
-        let place = |&vertex: &u32| frame.place(mesh.positions[vertex as usize]);
-        let boxes = mesh
-            .indices
-            .chunks_exact(3)
-            .map(|t| around([0, 1, 2].map(|k| place(&t[k]))));
+        let placed: Vec<_> = mesh.positions.iter().map(|&p| frame.place(p)).collect();
+        let triangles = mesh.indices.as_chunks().0;
+        let boxes = triangles
+            .iter()
+            .map(|t| around(t.map(|vertex| placed[vertex as usize])));
         let tree = Tree::over(boxes, MESH_LEVELS, || format!("mesh {:?}", mesh.name))?;
-        let ranks = Ranks::of(&mesh.positions);
         let mut corners = Vec::with_capacity(tree.order.len());
         let mut attributes = Vec::with_capacity(tree.order.len());
         for &triangle in &tree.order {
-            let first = 3 * triangle as usize;
-            let own = [mesh.indices[first], mesh.indices[first + 1], mesh.indices[first + 2]];
-            let slots = ranks.order(own);
+            let own = triangles[triangle as usize];
+            let slots = corner_order(own.map(|vertex| placed[vertex as usize]));
             let ordered = slots.map(|slot| own[slot]);
             let tex_coord = |vertex: u32| mesh.tex_coords.get(vertex as usize).copied().unwrap_or_default();
             attributes.push(gpu::BvhAttributes {
@@ -127,7 +125,7 @@ impl BvhMesh {
             bounds: None,
             vertex_count: mesh.positions.len(),
         };
-        let corners = built.refit(&mesh.positions, &mesh.normals);
+        let corners = built.fit_to(&placed, &mesh.normals);
         Ok((built, MeshUpload { corners, attributes }))
     }
 
@@ -146,23 +144,22 @@ impl BvhMesh {
         (size_of_val(&self.nodes[..]) + size_of_val(&self.corners[..])) as u64
     }
 
-    fn placed_corners(&self, positions: &[[f32; 3]], normals: &[[f32; 3]]) -> Vec<gpu::Corner> {
-        let corner = |&vertex: &u32| gpu::Corner {
-            position: self.frame.place(positions[vertex as usize]).to_array(),
-            normal: pack_normal(normals.get(vertex as usize).copied().unwrap_or_default()),
-        };
-        self.corners.iter().flatten().map(corner).collect()
-    }
-
     /// Moves the vertices and fits every node to them. The shape of the tree stays as it was built, so that rays get
     /// slower, never wrong, as the mesh departs from the shape it was built for.
     pub(crate) fn refit(&mut self, positions: &[[f32; 3]], normals: &[[f32; 3]]) -> Vec<gpu::Corner> {
         self.frame = MeshFrame::of(positions);
-        let corners = self.placed_corners(positions, normals);
-        self.bounds = fit(&mut self.nodes, |place| {
-            around([0, 1, 2].map(|k| corners[3 * place + k].position.into()))
-        });
-        corners
+        let placed: Vec<_> = positions.iter().map(|&p| self.frame.place(p)).collect();
+        self.fit_to(&placed, normals)
+    }
+
+    fn fit_to(&mut self, placed: &[Vec3], normals: &[[f32; 3]]) -> Vec<gpu::Corner> {
+        let place = |vertex: u32| placed[vertex as usize];
+        self.bounds = fit(&mut self.nodes, |leaf| around(self.corners[leaf].map(place)));
+        let corner = |&vertex: &u32| gpu::Corner {
+            position: place(vertex).to_array(),
+            normal: pack_normal(normals.get(vertex as usize).copied().unwrap_or_default()),
+        };
+        self.corners.iter().flatten().map(corner).collect()
     }
 }
 
@@ -170,29 +167,13 @@ fn around(corners: [Vec3; 3]) -> Aabb {
     Aabb::from_points(&corners.map(Into::into))
 }
 
-/// Which of two vertices comes first along an edge. Vertices in the same place have the same rank, so that triangles
-/// which share an edge agree even where normals or texture coordinates split its vertices.
-struct Ranks {
-    ranks: Vec<u32>,
-}
-
-impl Ranks {
-    fn of(positions: &[[f32; 3]]) -> Self {
-        let mut first = HashMap::with_capacity(positions.len());
-        let rank = |(vertex, position): (u32, &[f32; 3])| {
-            *first.entry(position.map(|x| (x + 0.0).to_bits())).or_insert(vertex)
-        };
-        Self {
-            ranks: (0..).zip(positions).map(rank).collect(),
-        }
-    }
-
-    /// The corners of a triangle by rank, as places in the triangle.
-    fn order(&self, corners: [u32; 3]) -> [usize; 3] {
-        let mut slots = [0, 1, 2];
-        slots.sort_by_key(|&slot| self.ranks[corners[slot] as usize]);
-        slots
-    }
+/// The corners of a triangle as places in it, sorted by where they are: triangles that share an edge name its ends in the
+/// same order, even where normals or texture coordinates split its vertices.
+fn corner_order(corners: [Vec3; 3]) -> [usize; 3] {
+    let mut slots = [0, 1, 2];
+    let place = |slot: usize| corners[slot].to_array();
+    slots.sort_by(|&a, &b| place(a).partial_cmp(&place(b)).unwrap_or(Ordering::Equal));
+    slots
 }
 
 /// Two bits for the place in the mesh's triangle of each stored corner, and [`ODD`].
