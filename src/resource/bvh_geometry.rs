@@ -62,9 +62,6 @@ pub(crate) const BVH_SLOTS: [Slot; 8] = [
     Slot::Sampler,
 ];
 
-/// Bytes of a node.
-const NODE_BYTES: u64 = size_of::<CwBvhNode>() as u64;
-
 /// Bits of an instance's mask. Twins of `BVH_ALL`, `BVH_CASTS_SHADOW`, `BVH_IN_ENV_MAPS`, `BVH_HAS_HOLES`.
 pub(crate) const ALL: u32 = 1;
 pub(crate) const CASTS_SHADOW: u32 = 2;
@@ -115,10 +112,12 @@ struct MeshPlace {
 /// What the last `prepare` uploaded, so that only changes are written again.
 #[derive(Debug, Default)]
 struct Prepared {
-    instances: Vec<gpu::BvhInstance>,
+    placed: Vec<Placed>,
     materials: Vec<gpu::BvhMaterial>,
-    nodes: Vec<CwBvhNode>,
 }
+
+/// The record of an instance, and its bounds in the unit frame unless rays cannot meet it.
+type Placed = (gpu::BvhInstance, Option<Aabb>);
 
 impl BvhGeometry {
     /// Validates a scene, builds the trees of its meshes and uploads them.
@@ -133,10 +132,25 @@ impl BvhGeometry {
         config: &BvhGeometryConfig,
     ) -> Result<Self, Error> {
         scene.validate()?;
-        let mut built = Vec::with_capacity(scene.meshes.len());
+        let storage = |label, count: u64, size: usize| {
+            use wgpu::BufferUsages as U;
+            device::buffer(device, label, count.max(1) * size as u64, U::STORAGE | U::COPY_DST)
+        };
+        // What is too large is refused before the trees are built, which takes longer.
+        let triangles = scene.meshes.iter().map(|m| m.indices.len() as u64 / 3).sum();
+        let corners = storage(
+            "lightfall::BvhGeometry::corners",
+            3 * triangles,
+            size_of::<bvh_mesh::gpu::Corner>(),
+        )?;
+        let attributes = storage(
+            "lightfall::BvhGeometry::attributes",
+            triangles,
+            size_of::<bvh_mesh::gpu::BvhAttributes>(),
+        )?;
+        let textures = TextureArrays::new(device, queue, scene, config.texture_size.max(1))?;
         let mut meshes: Vec<MeshPlace> = Vec::with_capacity(scene.meshes.len());
-        let top_nodes = scene.instances.len().max(1) as u64;
-        let (mut node_count, mut triangle_count) = (top_nodes, 0);
+        let (mut node_count, mut triangle_count) = (scene.instances.len().max(1) as u64, 0);
         for mesh in &scene.meshes {
             let (mesh, upload) = BvhMesh::build(mesh)?;
             let place = MeshPlace {
@@ -144,47 +158,34 @@ impl BvhGeometry {
                 first_triangle: count(triangle_count)?,
                 mesh,
             };
+            write_from(queue, &corners, 3 * place.first_triangle, &upload.corners);
+            write_from(queue, &attributes, place.first_triangle, &upload.attributes);
             node_count += place.mesh.nodes.len() as u64;
             triangle_count += place.mesh.triangle_count() as u64;
             meshes.push(place);
-            built.push(upload);
         }
-        let storage = |label, size: u64| {
-            use wgpu::BufferUsages as U;
-            device::buffer(device, label, size, U::STORAGE | U::COPY_DST)
-        };
-        let bytes_of = |n: u64, size: usize| n.max(1) * size as u64;
-        let corner_bytes = size_of::<bvh_mesh::gpu::Corner>();
-        let attribute_bytes = size_of::<bvh_mesh::gpu::BvhAttributes>();
         let geometry = Self {
-            nodes: storage("lightfall::BvhGeometry::nodes", node_count * NODE_BYTES)?,
-            corners: storage(
-                "lightfall::BvhGeometry::corners",
-                bytes_of(3 * triangle_count, corner_bytes),
-            )?,
-            attributes: storage(
-                "lightfall::BvhGeometry::attributes",
-                bytes_of(triangle_count, attribute_bytes),
-            )?,
+            nodes: storage("lightfall::BvhGeometry::nodes", node_count, size_of::<CwBvhNode>())?,
+            corners,
+            attributes,
             instance_buffer: storage(
                 "lightfall::BvhGeometry::instances",
-                bytes_of(scene.instances.len() as u64, size_of::<gpu::BvhInstance>()),
+                scene.instances.len() as u64,
+                size_of::<gpu::BvhInstance>(),
             )?,
             material_buffer: storage(
                 "lightfall::BvhGeometry::materials",
-                bytes_of(scene.materials.len() as u64, size_of::<gpu::BvhMaterial>()),
+                scene.materials.len() as u64,
+                size_of::<gpu::BvhMaterial>(),
             )?,
-            textures: TextureArrays::new(device, queue, scene, config.texture_size.max(1))?,
+            textures,
             instances: scene.instances.clone(),
             materials: scene.materials.clone(),
             meshes,
             prepared: Prepared::default(),
         };
-        for (place, upload) in geometry.meshes.iter().zip(&built) {
+        for place in &geometry.meshes {
             geometry.upload_nodes(queue, place);
-            geometry.upload_corners(queue, place, &upload.corners);
-            let at = u64::from(place.first_triangle) * attribute_bytes as u64;
-            queue.write_buffer(&geometry.attributes, at, bytemuck::cast_slice(&upload.attributes));
         }
         Ok(geometry)
     }
@@ -249,7 +250,7 @@ impl BvhGeometry {
         let corners = place.mesh.refit(positions, normals);
         let place = &self.meshes[mesh];
         self.upload_nodes(queue, place);
-        self.upload_corners(queue, place, &corners);
+        write_from(queue, &self.corners, 3 * place.first_triangle, &corners);
         Ok(())
     }
 
@@ -259,34 +260,22 @@ impl BvhGeometry {
     /// # Errors
     /// [`Error::LimitExceeded`] if the tree is deeper than rays can follow.
     pub fn prepare(&mut self, queue: &wgpu::Queue, frame: &UnitFrame) -> Result<u64, Error> {
-        let materials: Vec<_> = self.materials.iter().map(|m| self.material_record(frame, m)).collect();
-        let placed: Vec<_> = self.instances.iter().map(|i| self.instance_record(frame, i)).collect();
-        let mut records: Vec<_> = placed.iter().map(|(record, _)| *record).collect();
-        let (seen, boxes): (Vec<u32>, Vec<Aabb>) = (0..)
-            .zip(&placed)
-            .filter_map(|(index, (_, bounds))| bounds.map(|b| (index, b)))
-            .unzip();
-        let mut tree = Tree::over(boxes.iter().copied(), TOP_LEVELS, || "the instances".into())?;
-        fit(&mut tree.nodes, |place| boxes[tree.order[place] as usize]);
-        for (leaf, &seen_index) in tree.order.iter().enumerate() {
-            records[leaf].leaf = seen[seen_index as usize];
-        }
         let mut uploaded = 0;
         let mut upload = |buffer: &wgpu::Buffer, bytes: &[u8]| {
             queue.write_buffer(buffer, 0, bytes);
             uploaded += bytes.len() as u64;
         };
-        if records != self.prepared.instances {
-            upload(&self.instance_buffer, bytemuck::cast_slice(&records));
-            self.prepared.instances = records;
-        }
-        if tree.nodes != self.prepared.nodes {
-            upload(&self.nodes, bytemuck::cast_slice(&tree.nodes));
-            self.prepared.nodes = tree.nodes;
-        }
+        let materials: Vec<_> = self.materials.iter().map(|m| self.material_record(frame, m)).collect();
         if materials != self.prepared.materials {
             upload(&self.material_buffer, bytemuck::cast_slice(&materials));
             self.prepared.materials = materials;
+        }
+        let placed: Vec<_> = self.instances.iter().map(|i| self.instance_record(frame, i)).collect();
+        if placed != self.prepared.placed {
+            let (records, nodes) = tree_of_instances(&placed)?;
+            upload(&self.instance_buffer, bytemuck::cast_slice(&records));
+            upload(&self.nodes, bytemuck::cast_slice(&nodes));
+            self.prepared.placed = placed;
         }
         Ok(uploaded)
     }
@@ -344,17 +333,10 @@ impl BvhGeometry {
             ..*node
         };
         let nodes: Vec<_> = place.mesh.nodes.iter().map(absolute).collect();
-        let at = u64::from(place.first_node) * NODE_BYTES;
-        queue.write_buffer(&self.nodes, at, bytemuck::cast_slice(&nodes));
+        write_from(queue, &self.nodes, place.first_node, &nodes);
     }
 
-    fn upload_corners(&self, queue: &wgpu::Queue, place: &MeshPlace, corners: &[bvh_mesh::gpu::Corner]) {
-        let at = u64::from(place.first_triangle) * 3 * size_of::<bvh_mesh::gpu::Corner>() as u64;
-        queue.write_buffer(&self.corners, at, bytemuck::cast_slice(corners));
-    }
-
-    /// The record of an instance, and its bounds in the unit frame unless rays cannot meet it.
-    fn instance_record(&self, frame: &UnitFrame, instance: &Instance) -> (gpu::BvhInstance, Option<Aabb>) {
+    fn instance_record(&self, frame: &UnitFrame, instance: &Instance) -> Placed {
         let place = &self.meshes[instance.mesh];
         let mesh_frame = &place.mesh.frame;
         let world = instance.transform * DAffine3::from_translation(mesh_frame.center);
@@ -405,6 +387,27 @@ impl BvhGeometry {
             _pad: [0; 2],
         }
     }
+}
+
+/// The records of all instances with their leaves, and the nodes of the tree over them.
+fn tree_of_instances(placed: &[Placed]) -> Result<(Vec<gpu::BvhInstance>, Vec<CwBvhNode>), Error> {
+    let mut records: Vec<_> = placed.iter().map(|(record, _)| *record).collect();
+    let (seen, boxes): (Vec<u32>, Vec<Aabb>) = (0..)
+        .zip(placed)
+        .filter_map(|(index, (_, bounds))| bounds.map(|b| (index, b)))
+        .unzip();
+    let mut tree = Tree::over(boxes.iter().copied(), TOP_LEVELS, || "the instances".into())?;
+    fit(&mut tree.nodes, |leaf| boxes[tree.order[leaf] as usize]);
+    for (record, &box_) in records.iter_mut().zip(&tree.order) {
+        record.leaf = seen[box_ as usize];
+    }
+    Ok((records, tree.nodes))
+}
+
+/// Writes values into an array of them.
+fn write_from<T: bytemuck::Pod>(queue: &wgpu::Queue, buffer: &wgpu::Buffer, first: u32, values: &[T]) {
+    let offset = u64::from(first) * size_of::<T>() as u64;
+    queue.write_buffer(buffer, offset, bytemuck::cast_slice(values));
 }
 
 /// A number of nodes or triangles as an index.
