@@ -20,9 +20,10 @@ const BVH_FURTHEST: f32 = 1e30;
 const BVH_NODE_BITS: u32 = 0xff000000u;
 // A tree's root as the only node of a group.
 const BVH_ROOT_BIT: u32 = 0x80000000u;
-// What rounding may move a plane or a corner by, relative to its distance: each passes through fewer than eight
-// roundings of 2^-24.
-const BVH_ROUNDING: f32 = 0x1p-21;
+// What rounding may move a plane and a corner by together, relative to their distance. Each passes through five sums and
+// products, rounded by 2^-24, and a quotient, which WGSL lets be off by 2.5 units in the last place, five times as much:
+// ten roundings for each, 2^-19 for both with some to spare.
+const BVH_ROUNDING: f32 = 0x1p-19;
 // Smaller components of a direction, relative to the largest, are taken as this small, so that their inverse is finite.
 const BVH_SMALLEST: f32 = 0x1p-60;
 
@@ -152,9 +153,12 @@ fn bvh_visit(index: u32, ray: BvhRay, furthest: f32) -> BvhGroups {
 // the two triangles at an edge compute the same number, bit for bit, and no ray passes between them; a ray exactly on the
 // edge hits both. Returns (distance, weights of the second and third corner); a negative distance is a miss.
 fn bvh_triangle(ray: BvhRay, triangle: u32) -> vec3f {
-    let a = bvh_turn(bvh_corners[3u * triangle].xyz - ray.origin, ray.axis);
-    let b = bvh_turn(bvh_corners[3u * triangle + 1u].xyz - ray.origin, ray.axis);
-    let c = bvh_turn(bvh_corners[3u * triangle + 2u].xyz - ray.origin, ray.axis);
+    let to_a = bvh_corners[3u * triangle].xyz - ray.origin;
+    let to_b = bvh_corners[3u * triangle + 1u].xyz - ray.origin;
+    let to_c = bvh_corners[3u * triangle + 2u].xyz - ray.origin;
+    let a = bvh_turn(to_a, ray.axis);
+    let b = bvh_turn(to_b, ray.axis);
+    let c = bvh_turn(to_c, ray.axis);
     let z = vec3f(a.z, b.z, c.z);
     let x = vec3f(a.x, b.x, c.x) - ray.shear.x * z;
     let y = vec3f(a.y, b.y, c.y) - ray.shear.y * z;
@@ -165,7 +169,17 @@ fn bvh_triangle(ray: BvhRay, triangle: u32) -> vec3f {
         return vec3f(-1.0, 0.0, 0.0);
     }
     let shares = weights / (weights.x + weights.y + weights.z);
-    return vec3f(dot(shares, z) * ray.shear.z, shares.yz);
+    let distance = dot(shares, z) * ray.shear.z;
+    if distance < 0.0 {
+        return vec3f(-1.0, 0.0, 0.0);
+    }
+    // Where the ray grazes a triangle, or the triangle is thin, rounding is magnified. But no hit comes before the ray is
+    // where the triangle begins: then no box that a hit lies in begins behind it, and which hit is the closest depends on
+    // no tree and no order.
+    let sizes = max(abs(to_a), max(abs(to_b), abs(to_c)));
+    let rounding = 0.5 * BVH_ROUNDING * max(sizes.x, max(sizes.y, sizes.z)) * abs(ray.inverse);
+    let begins = min(to_a * ray.inverse, min(to_b * ray.inverse, to_c * ray.inverse)) - rounding;
+    return vec3f(max(distance, max(begins.x, max(begins.y, begins.z))), shares.yz);
 }
 
 // The closest hit of a ray that leaves `origin` along `direction`, nearer than `furthest`, on instances whose mask has a

@@ -32,7 +32,8 @@ struct RayHit {
 fn mesh_barycentric(triangle: u32, stored: vec2f) -> vec2f {
     let order = bvh_attributes[triangle].order;
     var weights = vec3f(0.0);
-    weights[order & 3u] = 1.0 - stored.x - stored.y;
+    // The other two may sum to a little more than one.
+    weights[order & 3u] = max(0.0, 1.0 - stored.x - stored.y);
     weights[(order >> 2u) & 3u] = stored.x;
     weights[(order >> 4u) & 3u] = stored.y;
     return weights.yz;
