@@ -112,6 +112,8 @@
 
 #![cfg_attr(docsrs, feature(doc_cfg))]
 
+#[cfg(all(test, feature = "bvh"))]
+mod bvh_tests;
 mod error;
 pub mod frame;
 mod gpu;
@@ -126,6 +128,10 @@ pub mod scene;
 mod shader_tests;
 mod timestamps;
 pub mod wgsl;
+
+// Unit tests share modules with the other tests, where the crate has a name.
+#[cfg(test)]
+extern crate self as lightfall;
 
 pub use error::Error;
 pub use glam;

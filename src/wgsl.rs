@@ -232,6 +232,15 @@ pub(crate) const PATH_TRACER: &str = compose![
 #[cfg(all(feature = "bvh", feature = "reference"))]
 pub(crate) const PATH_TRACER_RESOLVE: &str = compose!["reference/path_tracer/resolve.wgsl", "common/full_screen.wgsl"];
 
+/// What tests evaluate with a binding group of their own.
+#[cfg(all(test, feature = "bvh"))]
+pub(crate) const BVH_FUNCTIONS: &str = compose![
+    "pass/bvh_tracer/bindings.wgsl",
+    "common/bvh.wgsl",
+    "common/bvh_surface.wgsl",
+    "common/octahedral.wgsl",
+];
+
 /// Every composed module, by the name of its pass; for validation and for tools.
 #[doc(hidden)]
 pub const MODULES: &[(&str, &str)] = &[

@@ -272,17 +272,20 @@ fn bvh_is_free(origin: vec3f, direction: vec3f, furthest: f32, mask: u32) -> boo
     return bvh_traverse(origin, direction, furthest, mask, true).instance == BVH_NONE;
 }
 
-// A point moved off its surface along a normal by as many units in the last place as hit points may be wrong by. A hit
-// point's error is a few of them at the size of the largest number it was computed from: its own coordinates, or its
-// mesh's centre, which reaches at most the region's size; BVH_OFFSET_REACH stands for that where the point is near the
-// frame's origin.
+// A hit point's error is a few units in the last place at the size of the largest number that it was computed from. Four of
+// them never failed to lead off a surface; this many leave room for what compilers and adapters may round otherwise.
 const BVH_OFFSET_ULPS: f32 = 64.0;
+// What that size is at least, for points near the frame's origin.
 const BVH_OFFSET_REACH: f32 = 0.25;
 
+// A point on a surface, moved off it along a normal. For a hit, `bvh_leave` also knows how it was computed.
 fn bvh_offset(p: vec3f, normal: vec3f) -> vec3f {
-    let size = abs(p);
+    return p + (BVH_OFFSET_ULPS * bvh_ulp(abs(p))) * normal;
+}
+
+// The distance of neighbouring numbers of this size.
+fn bvh_ulp(size: vec3f) -> f32 {
     let reach = max(max(size.x, BVH_OFFSET_REACH), max(size.y, size.z));
-    // The power of two at or below `reach`, times 2^-23: the distance of neighbouring numbers there.
-    let ulp = bitcast<f32>(bitcast<u32>(reach) & 0x7f800000u) * 0x1p-23;
-    return p + (BVH_OFFSET_ULPS * ulp) * normal;
+    // The power of two at or below `reach`, times 2^-23.
+    return bitcast<f32>(bitcast<u32>(reach) & 0x7f800000u) * 0x1p-23;
 }

@@ -32,6 +32,8 @@ struct BvhMaterial {
 struct BvhSurface {
     // Unit frame
     position: vec3f,
+    // Distance of neighbouring numbers of the size that the position was computed from
+    ulp: f32,
     // Unit normal of the triangle, out of its front
     geometric_normal: vec3f,
     // Interpolated unit normal, on the same side; the geometric one where the mesh has none
@@ -73,6 +75,17 @@ fn bvh_corner_normal(corner: u32) -> vec3f {
     return select(octahedral_unpack(bits), vec3f(0.0), bits == BVH_NO_NORMAL);
 }
 
+// The unit vector that is normal to two edges of a triangle. A triangle without area, which a ray may still meet in its
+// one line, has some normal too.
+fn bvh_across(ab: vec3f, ac: vec3f) -> vec3f {
+    // Squares of small edges would be too small for f32.
+    let sizes = max(abs(ab), abs(ac));
+    let scale = 1.0 / max(1e-30, max(sizes.x, max(sizes.y, sizes.z)));
+    let across = cross(ab * scale, ac * scale);
+    let area = length(across);
+    return select(vec3f(0.0, 0.0, 1.0), across / area, area > 0.0);
+}
+
 fn bvh_surface(hit: BvhHit) -> BvhSurface {
     let first = 3u * hit.triangle;
     let a = bvh_corners[first].xyz;
@@ -80,23 +93,31 @@ fn bvh_surface(hit: BvhHit) -> BvhSurface {
     let ac = bvh_corners[first + 2u].xyz - a;
     let weights = hit.barycentric;
     let to_unit = bvh_instances[hit.instance].to_unit;
-    let position = bvh_instances[hit.instance].center + to_unit * (a + weights.x * ab + weights.y * ac);
+    let center = bvh_instances[hit.instance].center;
+    let position = center + to_unit * (a + weights.x * ab + weights.y * ac);
+    // A mesh may be far larger than the region that the unit frame was made for.
+    let size = abs(center) + abs(to_unit[0] * a.x) + abs(to_unit[1] * a.y) + abs(to_unit[2] * a.z);
     // Normals transform by the inverse transpose.
     let for_normals = transpose(bvh_instances[hit.instance].to_mesh);
     let is_odd = (bvh_attributes[hit.triangle].order & BVH_ODD) != 0u;
-    let across = cross(ab, ac);
-    let geometric = normalize(for_normals * (select(across, -across, is_odd) / max(1e-30, length(across))));
+    let geometric = normalize(for_normals * bvh_across(select(ab, ac, is_odd), select(ac, ab, is_odd)));
     let interpolated = (1.0 - weights.x - weights.y) * bvh_corner_normal(first)
         + weights.x * bvh_corner_normal(first + 1u) + weights.y * bvh_corner_normal(first + 2u);
-    let shading = for_normals * interpolated;
     let has_shading = dot(interpolated, interpolated) > 0.0;
+    let shading = select(geometric, normalize(for_normals * interpolated), has_shading);
     return BvhSurface(
         position,
+        bvh_ulp(size),
         geometric,
-        select(geometric, normalize(shading), has_shading),
+        select(-shading, shading, dot(shading, geometric) >= 0.0),
         bvh_tex_coord(hit.triangle, weights),
         bvh_instances[hit.instance].material,
     );
+}
+
+// Where a ray may start that leaves the surface on the side of a normal.
+fn bvh_leave(surface: BvhSurface, normal: vec3f) -> vec3f {
+    return surface.position + (BVH_OFFSET_ULPS * surface.ulp) * normal;
 }
 
 fn bvh_base_color(surface: BvhSurface) -> vec3f {

@@ -1,10 +1,13 @@
 //! What the tests share: a device, small scenes, statements about images.
 #![allow(dead_code, unused_imports, reason = "each test file uses its own part of this")]
 
+pub(crate) mod brute_force;
 pub(crate) mod evaluate;
 #[path = "../../examples/common/mod.rs"]
 mod examples;
+pub(crate) mod meshes;
 pub(crate) mod statistics;
+pub(crate) mod texture;
 
 pub(crate) use examples::adapter::{Gpu, Wishes};
 pub(crate) use examples::offline::{self, Component, Offline};

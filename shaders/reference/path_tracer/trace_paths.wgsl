@@ -135,7 +135,7 @@ fn path_see_emission(path: ptr<function, Path>, surface: BvhSurface, distance: f
 // A ray leaves a surface on the side that it goes to.
 fn path_leave(surface: BvhSurface, direction: vec3f) -> vec3f {
     let n = surface.geometric_normal;
-    return bvh_offset(surface.position, select(-n, n, dot(n, direction) > 0.0));
+    return bvh_leave(surface, select(-n, n, dot(n, direction) > 0.0));
 }
 
 // Light of one emitter, picked by its power.
