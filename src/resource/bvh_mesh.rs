@@ -198,3 +198,48 @@ fn pack_normal(normal: [f32; 3]) -> u32 {
         NO_NORMAL
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_that_share_an_edge_name_its_ends_in_the_same_order() {
+        let [a, b, c, d] = [[0.1, 0.2, 0.3], [0.1, -0.5, 0.3], [0.1, 0.2, -0.7], [0.4, 0.0, 0.0]].map(Vec3::from);
+        let before = |corners: [Vec3; 3], first: Vec3, second: Vec3| {
+            let order = corner_order(corners).map(|slot| corners[slot]);
+            order.iter().position(|&p| p == first) < order.iter().position(|&p| p == second)
+        };
+        for (p, q, others) in [(a, b, [c, d]), (a, c, [b, d]), (b, c, [a, d]), (a, d, [b, c])] {
+            let named: Vec<_> = others
+                .iter()
+                .flat_map(|&r| [[p, q, r], [q, p, r], [r, p, q], [q, r, p]])
+                .map(|corners| before(corners, p, q))
+                .collect();
+            assert!(named.iter().all(|&n| n == named[0]), "{p} {q}: {named:?}");
+        }
+    }
+
+    #[test]
+    fn the_order_of_corners_can_be_undone() {
+        let corners = [[0.3, 0.0, 0.0], [0.1, 0.0, 0.0], [0.2, 0.0, 0.0]].map(Vec3::from);
+        for places in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+            let slots = corner_order(places.map(|place| corners[place]));
+            let packed = pack_order(slots);
+            assert_eq!([0, 2, 4].map(|shift| (packed >> shift & 3) as usize), slots);
+            // The sorted corners turn 0.1, 0.2, 0.3: as corners[1], corners[2], corners[0] do.
+            let turns_like_sorted = [[1, 2, 0], [2, 0, 1], [0, 1, 2]].contains(&places);
+            assert_eq!(packed & ODD == 0, turns_like_sorted, "{places:?}");
+        }
+    }
+
+    #[test]
+    fn a_mesh_reaches_to_within_one_of_its_centre() {
+        for (from, to) in [(-1.0, 1.0), (3.0, 3.5), (-1e30, 1e30), (1e-30, 2e-30), (7.0, 7.0)] {
+            let frame = MeshFrame::of(&[[from, 0.0, 0.0], [to, 0.0, 0.0]]);
+            let ends = [from, to].map(|x| frame.place([x, 0.0, 0.0]).x);
+            assert_eq!(ends[0], -ends[1]);
+            assert!(ends[1] <= 1.0 && (ends[1] > 0.5 || from == to), "{from} {to}: {ends:?}");
+        }
+    }
+}
