@@ -260,9 +260,8 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::BVH_TRACER, "BvhAttributes", bvh_mesh::gpu::BvhAttributes { tex_coords, triangle, order }),
         #[cfg(all(feature = "bvh", feature = "reference"))]
         twin!(wgsl::PATH_TRACER, "Params", path_tracer::gpu::Params {
-            eye, is_parallel, forward, sample, right, bounces, up, roulette_from, size, component, emitter_count,
-            rectangle_count, pick_per_area, environment_pick, environment_norm, environment_size, environment_rotation,
-            _pad,
+            eye, is_parallel, forward, bounces, right, roulette_from, up, component, size, emitter_count, rectangle_count,
+            pick_per_area, environment_pick, environment_norm, environment_rotation, environment_size, _pad,
         }),
         #[cfg(all(feature = "bvh", feature = "reference"))]
         twin!(wgsl::PATH_TRACER, "Emitter", emitters::gpu::Emitter {

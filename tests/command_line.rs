@@ -67,7 +67,10 @@ fn bad_input_gets_one_line_status_two_and_no_file() {
         (&["sample:cornell", "--width", "0"], "width"),
         (&["sample:cornell", "--width", "1000000"], "limit"),
         (&["sample:cornell", "--width", "wide"], "--width"),
-        (&["sample:cornell", "--preset", "best"], "fast, balanced, accurate or reference"),
+        (
+            &["sample:cornell", "--preset", "best"],
+            "fast, balanced, accurate or reference",
+        ),
         (&["sample:cornell", "--set", "tracer.speed=1"], "tracer.iterations"),
         (&["sample:cornell", "--set", "photons=-1"], "photons"),
         (&["sample:cornell", "--set", "photons"], "KEY=VALUE"),
@@ -76,8 +79,14 @@ fn bad_input_gets_one_line_status_two_and_no_file() {
         (&["sample:cornell", "--time", "NaN"], "--time"),
         (&["sample:cornell", "--animate", "0:1"], "FROM:TO:FRAMES"),
         (&["sample:cornell", "--adapter", "no-such-adapter"], "setup-adapter"),
-        (&["sample:cornell", "--preset", "reference", "--set", "photons=1"], "--set"),
-        (&["sample:cornell", "--preset", "reference", "--frames", "0"], "1 or more"),
+        (
+            &["sample:cornell", "--preset", "reference", "--set", "photons=1"],
+            "--set",
+        ),
+        (
+            &["sample:cornell", "--preset", "reference", "--frames", "0"],
+            "1 or more",
+        ),
         (&["sample:cornell", "--component", "caustic"], "not available yet"),
         (&["sample:cornell", "--component", "specular"], "not available yet"),
         (&["sample:cornell", "--tracer", "fastest"], "--tracer"),

@@ -66,12 +66,13 @@ pub(super) struct EmitterParams {
 }
 
 impl Emitters {
-    /// Collects and uploads what shines in a scene, as it stands now: make it anew when a light or an emissive instance
-    /// changes.
+    /// Collects and uploads what shines in a scene, as it stands now, in a frame: make it anew when a light or an emissive
+    /// instance changes, or the frame does. What emits less than about a millionth of all power is picked too seldom to be
+    /// counted right.
     ///
     /// # Errors
-    /// As [`Scene::validate`]; [`Error::LimitExceeded`] for more emissive triangles, or a larger environment image, than
-    /// the device holds.
+    /// As [`Scene::validate`]; [`Error::LimitExceeded`] for more emissive triangles than the device holds, or an environment
+    /// image that is not narrower than its largest texture by a texel.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, frame: &UnitFrame, scene: &Scene) -> Result<Self, Error> {
         scene.validate()?;
         let mut list = EmitterList::of(frame, scene);
@@ -97,7 +98,7 @@ impl Emitters {
         })
     }
 
-    /// Lights and emissive triangles.
+    /// Lights and emissive triangles that are not dark.
     pub fn count(&self) -> u32 {
         self.count
     }
@@ -247,6 +248,10 @@ impl EmitterList {
             }
             let mesh = &scene.meshes[instance.mesh];
             let to_unit = DMat3::from_diagonal(DVec3::splat(1.0 / frame.length_scale())) * instance.transform.matrix3;
+            if !to_unit.inverse().is_finite() {
+                // Rays do not see it either.
+                continue;
+            }
             // A mirroring transform turns triangles over; their front goes with them.
             let is_mirrored = to_unit.determinant() < 0.0;
             for triangle in mesh.indices.chunks_exact(3) {
@@ -292,9 +297,9 @@ struct Environment {
     /// Row by row; in each one texel more than the image has. RGB: radiance; A: running share of the row, or in the last
     /// column of all rows.
     texels: Vec<[f32; 4]>,
-    /// Mean luminance over the sphere.
+    /// Mean over the sphere and the channels.
     mean: f64,
-    /// 1 / integral of luminance over the sphere.
+    /// 1 / integral of the mean of channels over the sphere.
     norm: f32,
 }
 
@@ -311,7 +316,7 @@ impl Environment {
         let mut texels = Vec::with_capacity((width + 1) * height);
         let mut rows = Vec::with_capacity(height);
         for row in 0..height {
-            let weight = |column| luminance(texel(row, column)) * solid_angle(row);
+            let weight = |column| mean_of_channels(texel(row, column)) * solid_angle(row);
             let shares = running_sum((0..width).map(weight));
             let all = shares.last().copied().unwrap_or_default();
             for (column, share) in shares.iter().enumerate() {
@@ -358,8 +363,8 @@ impl Environment {
     }
 }
 
-/// Twin of `environment_luminance`.
-fn luminance(radiance: Vec3) -> f64 {
+/// Twin of `environment_mean`.
+fn mean_of_channels(radiance: Vec3) -> f64 {
     radiance.as_dvec3().element_sum() / 3.0
 }
 

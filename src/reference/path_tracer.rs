@@ -5,7 +5,8 @@
 //! equation), Veach 1997 (multiple importance sampling), Walter et al. 2007 and Heitz 2018 (rough surfaces). All lights of
 //! [`LightKind`](crate::scene::LightKind) and all materials of [`Material`](crate::scene::Material) are modelled. Limits: a
 //! path never finds a point or parallel light through a smooth mirror or glass, so caustics of those are missing; instance
-//! flags are not honoured: everything blocks and reflects.
+//! flags are not honoured: everything blocks and reflects; interpolated normals let a few directions pass below the facet
+//! that they leave, as in other renderers (Veach 1997, section 5.3.4).
 
 use super::emitters::Emitters;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, RenderSpec, Slot};
@@ -25,21 +26,20 @@ pub(crate) mod gpu {
         pub(crate) eye: [f32; 3],
         pub(crate) is_parallel: u32,
         pub(crate) forward: [f32; 3],
-        pub(crate) sample: u32,
-        pub(crate) right: [f32; 3],
         pub(crate) bounces: u32,
-        pub(crate) up: [f32; 3],
+        pub(crate) right: [f32; 3],
         pub(crate) roulette_from: u32,
-        pub(crate) size: [u32; 2],
+        pub(crate) up: [f32; 3],
         pub(crate) component: u32,
+        pub(crate) size: [u32; 2],
         pub(crate) emitter_count: u32,
         pub(crate) rectangle_count: u32,
         pub(crate) pick_per_area: f32,
         pub(crate) environment_pick: f32,
         pub(crate) environment_norm: f32,
-        pub(crate) environment_size: [u32; 2],
         pub(crate) environment_rotation: f32,
-        pub(crate) _pad: u32,
+        pub(crate) environment_size: [u32; 2],
+        pub(crate) _pad: [u32; 2],
     }
 
     /// Twin of `Params` in `shaders/reference/path_tracer/resolve.wgsl`.
@@ -73,12 +73,13 @@ pub enum PathComponent {
     Specular = 4,
 }
 
-/// Speed against accuracy. No setting but `bounces` changes what the mean tends to.
+/// What to estimate, and how: `roulette_from` alone does not change what the mean tends to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PathTracerSettings {
     /// Which paths count.
     pub component: PathComponent,
-    /// Surfaces that light scatters at before the one the eye sees, 0 to 1000. Fewer leave out light.
+    /// Surfaces that light scatters at before the one the eye sees, at most 1000: more are taken as 1000. Fewer leave
+    /// out light.
     pub bounces: u32,
     /// Scatterings before Russian roulette may end a path. Fewer are faster and noisier.
     pub roulette_from: u32,
@@ -108,12 +109,12 @@ pub struct PathTracer {
     resolve: wgpu::RenderPipeline,
 }
 
-/// Sums of the samples of one view, 32 bytes a pixel.
+/// Means of the samples of one view, and how far they spread: 32 bytes a pixel.
 #[derive(Debug)]
 pub struct PathTracerResources {
     params: wgpu::Buffer,
     resolve_params: wgpu::Buffer,
-    sums: wgpu::Buffer,
+    moments: wgpu::Buffer,
     size: [u32; 2],
     samples: u32,
     groups: BindGroupCache,
@@ -210,7 +211,7 @@ impl PathTracer {
         }
     }
 
-    /// Records one more sample of every pixel.
+    /// Records one more sample of every pixel. Any number may be recorded into one encoder.
     pub fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -226,13 +227,16 @@ impl PathTracer {
             (&resources.params).into(),
             inputs.emitters.buffer().into(),
             inputs.emitters.environment().into(),
-            (&resources.sums).into(),
+            (&resources.moments).into(),
         ];
         let group = resources.groups.get(&self.device, label, &self.layout, &bound);
         let bound = inputs.geometry.bound();
         let geometry = resources
             .geometry_groups
             .get(&self.device, label, &self.geometry_layout, &bound);
+        if resources.samples == 0 {
+            encoder.clear_buffer(&resources.moments, 0, None);
+        }
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.trace);
         pass.set_bind_group(0, &group, &[]);
@@ -242,7 +246,7 @@ impl PathTracer {
     }
 
     /// Records the mean of all samples so far into an image, times `output_scale` ([`UnitFrame::output_scale`]). The image
-    /// is `rgba32float` and has the size of the resources.
+    /// is `rgba32float` and has the size of the resources; of a larger one the rest is meaningless.
     pub fn record_resolve(
         &self,
         queue: &wgpu::Queue,
@@ -256,7 +260,7 @@ impl PathTracer {
         };
         queue.write_buffer(&resources.resolve_params, 0, bytemuck::bytes_of(&params));
         let label = "lightfall::PathTracer::resolve";
-        let bound = [(&resources.resolve_params).into(), (&resources.sums).into()];
+        let bound = [(&resources.resolve_params).into(), (&resources.moments).into()];
         let group = resources
             .resolve_groups
             .get(&self.device, label, &self.resolve_layout, &bound);
@@ -287,7 +291,12 @@ impl PathTracerResources {
         Ok(Self {
             params: device::uniform_buffer::<gpu::Params>(device, "lightfall::PathTracer::params")?,
             resolve_params: device::uniform_buffer::<gpu::ResolveParams>(device, "lightfall::PathTracer::resolve")?,
-            sums: device::buffer(device, "lightfall::PathTracer::sums", bytes, U::STORAGE | U::COPY_SRC)?,
+            moments: device::buffer(
+                device,
+                "lightfall::PathTracer::moments",
+                bytes,
+                U::STORAGE | U::COPY_SRC | U::COPY_DST,
+            )?,
             size,
             samples: 0,
             groups: BindGroupCache::default(),
@@ -318,29 +327,28 @@ impl PathTracerResources {
     ) -> Result<PathEstimate, Error> {
         let scale = f64::from(frame.output_scale(1.0)?);
         let count = f64::from(self.samples);
-        let sums: Vec<[[f32; 4]; 2]> = read_back::read_buffer_blocking(device, queue, &self.sums)?;
-        let mean_of = |sum: f32| if count > 0.0 { f64::from(sum) / count } else { 0.0 };
-        let error_of = |sum: f32, squares: f32| {
-            let variance = (mean_of(squares) - mean_of(sum).powi(2)).max(0.0);
+        let moments: Vec<[[f32; 4]; 2]> = read_back::read_buffer_blocking(device, queue, &self.moments)?;
+        let mean = |[mean, _]: &[[f32; 4]; 2], c: usize| if count > 0.0 { f64::from(mean[c]) } else { 0.0 };
+        let error = |[_, spread]: &[[f32; 4]; 2], c: usize| {
             if count > 1.0 {
-                (variance / (count - 1.0)).sqrt()
+                (f64::from(spread[c]) / (count * (count - 1.0))).sqrt()
             } else {
                 f64::INFINITY
             }
         };
-        let estimate = |of: &dyn Fn(&[[f32; 4]; 2], usize) -> f64| {
-            let pixel = |sums| [0, 1, 2].map(|c| (scale * of(sums, c)) as f32);
-            sums.iter().map(pixel).collect()
+        let all = |of: &dyn Fn(&[[f32; 4]; 2], usize) -> f64| {
+            let pixel = |moments| [0, 1, 2].map(|c| (scale * of(moments, c)) as f32);
+            moments.iter().map(pixel).collect()
         };
         Ok(PathEstimate {
-            mean: estimate(&|sums, c| mean_of(sums[0][c])),
-            standard_error: estimate(&|sums, c| error_of(sums[0][c], sums[1][c])),
+            mean: all(&mean),
+            standard_error: all(&error),
         })
     }
 
     /// Bytes allocated.
     pub fn memory_use(&self) -> u64 {
-        self.params.size() + self.resolve_params.size() + self.sums.size()
+        self.params.size() + self.resolve_params.size() + self.moments.size()
     }
 }
 
@@ -364,7 +372,6 @@ fn params(resources: &PathTracerResources, inputs: &PathTracerInputs<'_>) -> gpu
         eye: frame.point(camera.transform.translation).to_array(),
         is_parallel: u32::from(is_parallel),
         forward: unit(-axes.z_axis, 1.0),
-        sample: resources.samples,
         right: unit(axes.x_axis, half_height * aspect),
         bounces: settings.bounces.min(MAX_BOUNCES),
         up: unit(axes.y_axis, half_height),
@@ -378,6 +385,6 @@ fn params(resources: &PathTracerResources, inputs: &PathTracerInputs<'_>) -> gpu
         environment_norm: emitters.environment_norm,
         environment_size: emitters.environment_size,
         environment_rotation: emitters.environment_rotation,
-        _pad: 0,
+        _pad: [0; 2],
     }
 }

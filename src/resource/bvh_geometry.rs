@@ -84,8 +84,9 @@ impl Default for BvhGeometryConfig {
 
 /// A scene's triangles on the GPU, for rays.
 ///
-/// A tree of eight-wide compressed nodes (Ylitie et al. 2017) for each mesh, and one over the instances. Bytes on the GPU: 80 a triangle (three corners of position and normal; texture coordinates), 80 a node, of
-/// which a mesh has about one for six triangles, 128 an instance, 64 a material; on the CPU 12 a triangle and 80 a node.
+/// A tree of eight-wide compressed nodes (Ylitie et al. 2017) for each mesh, and one over the instances. Bytes on the GPU:
+/// 80 a triangle (three corners of position and normal; texture coordinates), 80 a node, of which a mesh has about one for
+/// six triangles, 128 an instance, 64 a material; on the CPU 12 a triangle and 80 a node.
 /// An instance whose transform is singular has no inside to trace in, so rays do not see it.
 #[derive(Debug)]
 pub struct BvhGeometry {
@@ -350,7 +351,7 @@ impl BvhGeometry {
             (instance.in_env_maps, IN_ENV_MAPS),
             (has_holes, HAS_HOLES),
         ];
-        let record = gpu::BvhInstance {
+        let mut record = gpu::BvhInstance {
             to_mesh: columns(&to_mesh),
             to_unit: columns(&to_unit),
             center: center.to_array(),
@@ -361,6 +362,10 @@ impl BvhGeometry {
             leaf: 0,
         };
         let is_invertible = to_mesh.is_finite() && record.to_mesh.iter().flatten().all(|x| x.is_finite());
+        if !is_invertible {
+            // No number is unlike itself: what never changes is not to be uploaded again.
+            record.to_mesh = Default::default();
+        }
         let bounds = place.mesh.bounds.filter(|_| is_invertible).map(|Aabb { min, max }| {
             let corner = |i: usize| Vec3A::select(BVec3A::new(i & 1 > 0, i & 2 > 0, i & 4 > 0), max, min);
             let points: [_; 8] = std::array::from_fn(|i| {

@@ -111,6 +111,7 @@ fn segment_distance((p1, q1): (DVec3, DVec3), (p2, q2): (DVec3, DVec3)) -> f64 {
     if (0.0..=1.0).contains(&s) && (0.0..=1.0).contains(&t) {
         return between.dot(n).abs() / n.length();
     }
+    #[expect(clippy::manual_clamp, reason = "clamp would keep what is not a number")]
     let to_end = |p: DVec3, from: DVec3, along: DVec3| {
         let part = (p - from).dot(along) / along.length_squared();
         // Not a number for a point, which maximum turns into its place.

@@ -9,6 +9,8 @@ const EMITTER_RECTANGLE: u32 = 3u;
 const EMITTER_TRIANGLE: u32 = 4u;
 const EMITTER_ENVIRONMENT: u32 = 5u;
 
+// A lamp that is set into a surface stands before it, though rounding may say otherwise.
+const EMITTER_BEFORE: f32 = 1.0 - 0x1p-16;
 const EMITTER_PI: f32 = 3.14159265;
 
 struct Emitter {
@@ -155,12 +157,14 @@ fn emitter_sample_rectangle(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
     let way = position - p;
     let squared = dot(way, way);
     let direction = way / sqrt(max(squared, 1e-30));
-    let cosine = -dot(normalize(cross(e.u, e.v)), direction);
+    let normal = normalize(cross(e.u, e.v));
+    let cosine = -dot(normal, direction);
     if squared == 0.0 || cosine <= 0.0 {
         return emitter_dark();
     }
     let pdf = emitter_flat_pdf(e.pick, e.extent, squared, cosine);
-    return EmitterSample(e.strength, pdf, direction, false, position, true);
+    // Before a surface that the lamp may be set into.
+    return EmitterSample(e.strength, pdf, direction, false, bvh_offset(position, normal), true);
 }
 
 // Density with which `emitter_sample` finds the point where a ray crosses a rectangle's front, per solid angle; 0 if it
@@ -173,7 +177,7 @@ fn emitter_rectangle_pdf(index: u32, origin: vec3f, direction: vec3f, furthest: 
         return 0.0;
     }
     let t = dot(across, e.position - origin) / dot(across, direction);
-    if t <= 0.0 || t >= furthest {
+    if t <= 0.0 || t * EMITTER_BEFORE >= furthest {
         return 0.0;
     }
     // Coordinates along u and v, which need not be perpendicular (Cramer).
@@ -202,6 +206,11 @@ fn emitter_sample_triangle(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
     }
     let coords = e.tex_coords;
     let tex_coord = coords[0] + folded.x * (coords[1] - coords[0]) + folded.y * (coords[2] - coords[0]);
+    let base = bvh_texture(bvh_materials[e.material].base_color_texture, tex_coord);
+    if base.a < bvh_materials[e.material].alpha_cutoff {
+        // A hole, through which rays pass.
+        return emitter_dark();
+    }
     let texel = bvh_texture(bvh_materials[e.material].emission_texture, tex_coord).rgb;
     let pdf = emitter_flat_pdf(e.pick, e.extent, squared, cosine);
     return EmitterSample(e.strength * texel, pdf, direction, false, bvh_offset(position, normal), true);
@@ -218,14 +227,14 @@ fn environment_radiance(direction: vec3f) -> vec3f {
     return textureLoad(environment, min(texel, params.environment_size - 1u), 0).rgb;
 }
 
-// Twin of `reference::emitters::luminance`: what the environment is sampled in proportion to.
-fn environment_luminance(radiance: vec3f) -> f32 {
+// Twin of `reference::emitters::mean_of_channels`: what the environment is sampled in proportion to.
+fn environment_mean(radiance: vec3f) -> f32 {
     return (radiance.x + radiance.y + radiance.z) / 3.0;
 }
 
 // Density per solid angle of directions of this radiance.
 fn environment_pdf(radiance: vec3f) -> f32 {
-    return environment_luminance(radiance) * params.environment_norm;
+    return environment_mean(radiance) * params.environment_norm;
 }
 
 // A texel by its share of the light, then uniform within it.

@@ -14,6 +14,9 @@ const SCATTER_IS_TRANSMISSIVE: f32 = 0.5;
 const SCATTER_SMOOTH: f32 = 0.03;
 // Narrower lobes are as narrow as this.
 const SCATTER_LEAST_ALPHA: f32 = 0.001;
+// Glass of an index nearer to 1 than this is taken as smooth: from directions that differ by rounding alone no facet can be
+// told.
+const SCATTER_LEAST_BENDING: f32 = 0x1p-10;
 const SCATTER_PI: f32 = 3.14159265;
 
 // A surface as a ray finds it.
@@ -47,12 +50,14 @@ fn scatter_at(surface: BvhSurface, direction: vec3f) -> Scatterer {
     let normal = select(-surface.shading_normal, surface.shading_normal, is_front);
     let is_smooth = roughness < SCATTER_SMOOTH;
     var kind = SCATTER_DIFFUSE;
+    let index = bvh_materials[m].index_of_refraction;
     if bvh_materials[m].transmission > SCATTER_IS_TRANSMISSIVE {
-        kind = select(SCATTER_ROUGH_GLASS, SCATTER_GLASS, is_smooth);
+        // Facets that do not bend light leave it a single direction.
+        let is_single = is_smooth || index - 1.0 < SCATTER_LEAST_BENDING;
+        kind = select(SCATTER_ROUGH_GLASS, SCATTER_GLASS, is_single);
     } else if metallic > SCATTER_IS_METAL {
         kind = select(SCATTER_METAL, SCATTER_MIRROR, is_smooth);
     }
-    let index = bvh_materials[m].index_of_refraction;
     let alpha = max(roughness * roughness, SCATTER_LEAST_ALPHA);
     return Scatterer(
         kind, sampling_frame(normal), bvh_base_color(surface), alpha, select(1.0 / index, index, is_front),

@@ -6,14 +6,12 @@ struct Params {
     eye: vec3f,
     is_parallel: u32,
     forward: vec3f,
-    // Number of this sample
-    sample: u32,
-    right: vec3f,
     bounces: u32,
-    up: vec3f,
+    right: vec3f,
     roulette_from: u32,
-    size: vec2u,
+    up: vec3f,
     component: u32,
+    size: vec2u,
     emitter_count: u32,
     // Emitters 0 up to this are rectangles, which rays may meet
     rectangle_count: u32,
@@ -21,18 +19,18 @@ struct Params {
     pick_per_area: f32,
     // Probability of picking the environment
     environment_pick: f32,
-    // 1 / integral of its luminance over the sphere
+    // 1 / integral over the sphere of the mean of its channels
     environment_norm: f32,
-    environment_size: vec2u,
     environment_rotation: f32,
+    environment_size: vec2u,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> emitters: array<Emitter>;
 // Radiance, and the part of a row's light up to and with a texel; in the last column the part of all rows up to a row
 @group(0) @binding(2) var environment: texture_2d<f32>;
-// For each pixel the sum of samples (w: their number) and the sum of their squares
-@group(0) @binding(3) var<storage, read_write> sums: array<vec4f>;
+// For each pixel the mean of its samples (w: their number) and the sum of their squared distances from it
+@group(0) @binding(3) var<storage, read_write> moments: array<vec4f>;
 
 // Twins of `reference::PathComponent`.
 const COMPONENT_ALL: u32 = 0u;
@@ -61,11 +59,12 @@ struct Path {
 // Numbers in [0, 1), four at a time, a function of pixel, sample and how many were drawn.
 struct PathRandom {
     pixel: vec2u,
+    sample: u32,
     drawn: u32,
 }
 
 fn path_random(state: ptr<function, PathRandom>) -> vec4f {
-    let bits = hash_pcg4d(vec4u((*state).pixel, params.sample, (*state).drawn));
+    let bits = hash_pcg4d(vec4u((*state).pixel, (*state).sample, (*state).drawn));
     (*state).drawn++;
     return vec4f(bits >> vec4u(8u)) * 0x1p-24;
 }
@@ -175,8 +174,8 @@ fn path_begin(pixel: vec2u, u: vec2f) -> Path {
     return Path(origin, normalize(direction), vec3f(1.0), 1.0, vec3f(0.0), 0.0, 0u, false, true);
 }
 
-fn path_trace(pixel: vec2u) -> vec3f {
-    var random = PathRandom(pixel, 0u);
+fn path_trace(pixel: vec2u, sample: u32) -> vec3f {
+    var random = PathRandom(pixel, sample, 0u);
     var path = path_begin(pixel, path_random(&random).xy);
     loop {
         let hit = bvh_closest(path.origin, path.direction, BVH_FURTHEST, BVH_ALL);
@@ -230,15 +229,12 @@ fn trace_paths(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= params.size) {
         return;
     }
-    let radiance = path_trace(id.xy);
     let at = 2u * (id.y * params.size.x + id.x);
-    let sum = vec4f(radiance, 1.0);
-    let squares = vec4f(radiance * radiance, 0.0);
-    if params.sample == 0u {
-        sums[at] = sum;
-        sums[at + 1u] = squares;
-    } else {
-        sums[at] += sum;
-        sums[at + 1u] += squares;
-    }
+    let before = moments[at];
+    let radiance = path_trace(id.xy, u32(before.w));
+    // Welford 1962: no sum grows until samples are lost in its rounding.
+    let count = before.w + 1.0;
+    let distance = radiance - before.rgb;
+    moments[at] = vec4f(before.rgb + distance / count, count);
+    moments[at + 1u] += vec4f(distance * distance * (before.w / count), 0.0);
 }

@@ -1,11 +1,18 @@
 //! Procedural scenes for docs, tests and measurements. Each is a function of time, in seconds; lengths are in metres.
 
+mod colonnade;
+mod living_room;
+mod solids;
+
+pub use colonnade::colonnade;
+pub use living_room::living_room;
+
 use super::{Camera, Instance, Light, LightKind, Material, Mesh, Projection, Scene};
 use glam::{DAffine3, DVec3, Vec3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Names accepted by [`by_name`], in the order of this list.
-pub const NAMES: [&str; 7] = [
+pub const NAMES: [&str; 9] = [
     "cornell",
     "cornell-spot",
     "plane",
@@ -13,6 +20,8 @@ pub const NAMES: [&str; 7] = [
     "two-rooms",
     "pillars",
     "penumbra",
+    "living-room",
+    "colonnade",
 ];
 
 /// The sample of this name at `time`, or `None` if there is none.
@@ -25,6 +34,8 @@ pub fn by_name(name: &str, time: f64) -> Option<Scene> {
         "two-rooms" => two_rooms(time),
         "pillars" => pillars(time),
         "penumbra" => penumbra(time),
+        "living-room" => living_room(time),
+        "colonnade" => colonnade(time),
         _ => return None,
     })
 }
@@ -301,11 +312,22 @@ impl Builder {
 
     /// Adds a mesh and one instance of it; returns the instance's index.
     fn mesh(&mut self, mesh: Mesh, material: usize) -> usize {
-        let name = mesh.name.clone();
+        let shape = self.shape(mesh);
+        self.place(shape, material, DAffine3::IDENTITY)
+    }
+
+    /// Adds a mesh to be placed; returns its index.
+    fn shape(&mut self, mesh: Mesh) -> usize {
         self.scene.meshes.push(mesh);
+        self.scene.meshes.len() - 1
+    }
+
+    /// Adds an instance, named as its mesh; returns its index.
+    fn place(&mut self, mesh: usize, material: usize, transform: DAffine3) -> usize {
         self.scene.instances.push(Instance {
-            name,
-            ..Instance::new(self.scene.meshes.len() - 1, material)
+            name: self.scene.meshes[mesh].name.clone(),
+            transform,
+            ..Instance::new(mesh, material)
         });
         self.scene.instances.len() - 1
     }
@@ -425,6 +447,7 @@ fn inward_sphere(name: &str, rings: u32, segments: u32) -> Mesh {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::collections::HashMap;
 
     /// Geometric normals of an instance's triangles with their centroids, world space.
     fn facets(scene: &Scene, instance: usize) -> Vec<(DVec3, DVec3)> {
@@ -456,7 +479,16 @@ mod tests {
 
     #[test]
     fn something_moves_in_each_sample_that_says_so() {
-        for name in ["cornell", "cornell-spot", "two-rooms", "pillars", "penumbra"] {
+        let moving = [
+            "cornell",
+            "cornell-spot",
+            "two-rooms",
+            "pillars",
+            "penumbra",
+            "living-room",
+            "colonnade",
+        ];
+        for name in moving {
             let (a, b) = (by_name(name, 0.0).unwrap(), by_name(name, 1.0).unwrap());
             assert!(a.instances != b.instances || a.lights != b.lights, "{name}");
         }
@@ -491,6 +523,83 @@ mod tests {
         let middle = door.iter().map(|f| f.1).sum::<DVec3>() / door.len() as f64;
         for (normal, at) in door {
             assert!(normal.dot(at - middle) > 0.0, "door");
+        }
+    }
+
+    /// Flux through a closed surface of the field p/3, which is its volume, and the directed edges that no triangle meets
+    /// from the other side.
+    fn volume_and_open_edges(mesh: &Mesh) -> (f64, usize) {
+        let mut edges = HashMap::new();
+        let mut volume = 0.0;
+        let key = |i: u32| mesh.positions[i as usize].map(|x| (x + 0.0).to_bits());
+        let at = |i: u32| Vec3::from(mesh.positions[i as usize]).as_dvec3();
+        for t in mesh.indices.chunks_exact(3) {
+            volume += at(t[0]).dot(at(t[1]).cross(at(t[2]))) / 6.0;
+            for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+                *edges.entry((key(a), key(b))).or_insert(0i32) += 1;
+                *edges.entry((key(b), key(a))).or_insert(0i32) -= 1;
+            }
+        }
+        (volume, edges.values().filter(|&&count| count != 0).count())
+    }
+
+    #[test]
+    fn the_larger_samples_are_as_large_as_they_say() {
+        for (name, triangles, size) in [
+            ("living-room", 42_106, DVec3::new(7.0, 2.8, 5.5)),
+            ("colonnade", 77_430, DVec3::new(40.0, 12.0, 16.0)),
+        ] {
+            let scene = by_name(name, 0.0).unwrap();
+            let found = scene.triangle_count();
+            let inside: Vec<_> = scene.instances.iter().filter(|i| i.name != "outside").collect();
+            let corners = inside.iter().flat_map(|i| {
+                let mesh = &scene.meshes[i.mesh];
+                let place = |p: &[f32; 3]| i.transform.transform_point3(Vec3::from(*p).as_dvec3());
+                mesh.positions.iter().map(place).collect::<Vec<_>>()
+            });
+            let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| {
+                (min.min(p), max.max(p))
+            });
+            println!("{name}: {found} triangles, {}", max - min);
+            assert!(
+                (found as f64 / f64::from(triangles) - 1.0).abs() < 0.1,
+                "{name}: {found}"
+            );
+            assert!(
+                (max - min - size).abs().max_element() < 0.02 * size.length(),
+                "{name}: {}",
+                max - min
+            );
+        }
+        let colonnade = colonnade(0.0);
+        let count = |name: &str| colonnade.instances.iter().filter(|i| i.name == name).count();
+        assert_eq!([count("baluster"), count("column") + count("upper column")], [160, 32]);
+    }
+
+    #[test]
+    fn solids_of_the_larger_samples_are_closed_and_face_outward() {
+        // Rooms face inward and are open: at the window, to the sky.
+        const SHELLS: [&str; 5] = ["floor", "ceiling", "back wall", "walls", "outside"];
+        for name in ["living-room", "colonnade"] {
+            let scene = by_name(name, 0.0).unwrap();
+            for mesh in scene.meshes.iter().filter(|m| !SHELLS.contains(&m.name.as_str())) {
+                let (volume, open_edges) = volume_and_open_edges(mesh);
+                assert_eq!(open_edges, 0, "{name}: {}", mesh.name);
+                assert!(volume > 0.0, "{name}: {}: {volume}", mesh.name);
+            }
+        }
+    }
+
+    #[test]
+    fn no_triangle_of_a_sample_is_without_area() {
+        for name in NAMES {
+            for mesh in by_name(name, 0.3).unwrap().meshes {
+                let at = |i: u32| Vec3::from(mesh.positions[i as usize]).as_dvec3();
+                for t in mesh.indices.chunks_exact(3) {
+                    let across = (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0]));
+                    assert!(across.length() > 1e-9, "{name}: {}: {t:?}", mesh.name);
+                }
+            }
         }
     }
 }
