@@ -63,7 +63,7 @@ enum Method {
 )]
 struct Arguments {
     /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, plane, furnace, two-rooms, pillars,
-    /// penumbra)
+    /// penumbra, living-room, colonnade)
     scene: String,
     /// Width in pixels
     #[arg(long, default_value_t = 512)]

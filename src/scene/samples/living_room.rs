@@ -183,7 +183,7 @@ fn seats(builder: &mut Builder, wood: usize) {
     let teal = builder.material(Material::diffuse("teal cloth", [0.08, 0.32, 0.34]));
     let red = builder.material(Material::diffuse("red cloth", [0.55, 0.1, 0.08]));
     let mut soft = |name: &str, half: [f64; 3], radius| {
-        let mut mesh = rounded_box(half.into(), radius, 3);
+        let mut mesh = rounded_box(half.into(), radius, 2);
         mesh.name = name.into();
         builder.shape(mesh)
     };
@@ -467,7 +467,7 @@ fn plant(builder: &mut Builder) {
     }
     let stem = builder.mesh(joined("stem", stems), brown);
     builder.scene.instances[stem].transform = at;
-    let mut leaf = sphere(1.0, 10, 14);
+    let mut leaf = sphere(1.0, 6, 8);
     leaf.name = "leaf".into();
     let leaf = builder.shape(leaf);
     for (i, center) in (0..).zip(leaves) {
