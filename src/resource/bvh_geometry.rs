@@ -7,7 +7,7 @@ use super::texture_arrays::TextureArrays;
 use crate::gpu::{self as device, Bound, Slot};
 use crate::scene::{Instance, Material, Scene, UnitFrame};
 use crate::{Error, resource};
-use glam::{BVec3A, DAffine3, DMat3, Vec3, Vec3A};
+use glam::{BVec3A, DAffine3, DMat3, DVec3, Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::cwbvh::node::CwBvhNode;
 
@@ -115,6 +115,20 @@ struct MeshPlace {
 struct Prepared {
     placed: Vec<Placed>,
     materials: Vec<gpu::BvhMaterial>,
+}
+
+/// The tree of a mesh, for measurements.
+#[doc(hidden)]
+#[derive(Debug)]
+pub struct MeshTree<'a> {
+    /// The first one is the root.
+    pub nodes: &'a [CwBvhNode],
+    /// Vertices of the triangles at the places of the leaves.
+    pub corners: &'a [[u32; 3]],
+    /// Where the mesh's frame has its origin, and what one unit of it is, in mesh space.
+    pub center: DVec3,
+    /// See `center`.
+    pub scale: f64,
 }
 
 /// The record of an instance, and its bounds in the unit frame unless rays cannot meet it.
@@ -311,6 +325,12 @@ impl BvhGeometry {
     /// Bytes kept on the CPU for refitting.
     pub fn cpu_memory_use(&self) -> u64 {
         self.meshes.iter().map(|m| m.mesh.cpu_bytes()).sum()
+    }
+
+    /// The tree of a mesh, for measurements.
+    #[doc(hidden)]
+    pub fn mesh_tree(&self, mesh: usize) -> Option<MeshTree<'_>> {
+        self.meshes.get(mesh).map(|place| place.mesh.tree())
     }
 
     /// What [`BVH_SLOTS`] take.

@@ -1,5 +1,6 @@
 //! One mesh as rays meet it: triangles in the order of the leaves of a compressed wide tree.
 
+use super::bvh_geometry::MeshTree;
 use super::bvh_tree::{Tree, fit};
 use crate::Error;
 use crate::scene::Mesh;
@@ -142,6 +143,15 @@ impl BvhMesh {
     /// Bytes kept on the CPU.
     pub(crate) fn cpu_bytes(&self) -> u64 {
         (size_of_val(&self.nodes[..]) + size_of_val(&self.corners[..])) as u64
+    }
+
+    pub(crate) fn tree(&self) -> MeshTree<'_> {
+        MeshTree {
+            nodes: &self.nodes,
+            corners: &self.corners,
+            center: self.frame.center,
+            scale: self.frame.scale,
+        }
     }
 
     /// Moves the vertices and fits every node to them. The shape of the tree stays as it was built, so that rays get

@@ -28,6 +28,9 @@ pub(crate) mod view;
 mod visibility;
 
 #[cfg(feature = "bvh")]
+#[doc(hidden)]
+pub use bvh_geometry::MeshTree;
+#[cfg(feature = "bvh")]
 pub use bvh_geometry::{BvhGeometry, BvhGeometryConfig};
 pub use env_maps::EnvMaps;
 pub(crate) use env_maps::SURFACE_FORMAT;
