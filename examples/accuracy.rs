@@ -487,6 +487,7 @@ fn markdown(arguments: &Arguments, gpu: &Gpu, rows: &[Value]) -> String {
         .iter()
         .map(|row| format!("{} × {}", row["size"][0], row["size"][1]))
         .collect();
+    sizes.sort();
     sizes.dedup();
     let mut text = format!(
         "Adapter: {}. Size: {}. Time: median of a frame in the steady state, by GPU timestamps unless marked.\n\n\

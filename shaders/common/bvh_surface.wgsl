@@ -122,10 +122,12 @@ fn bvh_leave(surface: BvhSurface, normal: vec3f) -> vec3f {
 
 fn bvh_base_color(surface: BvhSurface) -> vec3f {
     let material = surface.material;
-    return bvh_materials[material].base_color * bvh_texture(bvh_materials[material].base_color_texture, surface.tex_coord).rgb;
+    let texel = bvh_texture(bvh_materials[material].base_color_texture, surface.tex_coord);
+    return bvh_materials[material].base_color * texel.rgb;
 }
 
 fn bvh_emission(surface: BvhSurface) -> vec3f {
     let material = surface.material;
-    return bvh_materials[material].emission * bvh_texture(bvh_materials[material].emission_texture, surface.tex_coord).rgb;
+    let texel = bvh_texture(bvh_materials[material].emission_texture, surface.tex_coord);
+    return bvh_materials[material].emission * texel.rgb;
 }

@@ -25,8 +25,8 @@ pub(crate) const BLOCK: u32 = 64;
 /// A list of paths on the GPU, of one hop at a time: those that a tracer lost, in ascending order, so that the list is the
 /// same every time.
 ///
-/// A storage buffer, also `COPY_SRC` and `COPY_DST`: the three workgroup counts of an indirect dispatch with an invocation for each path in workgroups of
-/// 64, none above 65 535; how many paths there are; their numbers. All `u32`.
+/// A storage buffer, also `COPY_SRC` and `COPY_DST`: the three workgroup counts of an indirect dispatch with an invocation
+/// for each path in workgroups of 64, none above 65 535; how many paths there are; their numbers. All `u32`.
 #[derive(Debug)]
 pub struct LostRays {
     buffer: wgpu::Buffer,
