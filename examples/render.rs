@@ -395,11 +395,7 @@ fn load(arguments: &Arguments, time: f64) -> Result<Scene, String> {
     if !time.is_finite() {
         return Err("--time: expected a finite number of seconds".into());
     }
-    match arguments.scene.strip_prefix("sample:") {
-        Some(name) => samples::by_name(name, time)
-            .ok_or_else(|| format!("no sample is called {name:?}; there are {}", samples::NAMES.join(", "))),
-        None => gltf_scene::load(Path::new(&arguments.scene), time),
-    }
+    named_scene::load(&arguments.scene, time)
 }
 
 fn check_scene(arguments: &Arguments, scene: &Scene, summary: &SceneSummary) -> Result<(), String> {

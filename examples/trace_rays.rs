@@ -61,7 +61,7 @@ fn main() {
 }
 
 fn run(arguments: &Arguments) -> Result<(), String> {
-    let scene = load(&arguments.scene)?;
+    let scene = named_scene::load(&arguments.scene, 0.0)?;
     let wishes = Wishes {
         timestamps: true,
         ..Wishes::default()
@@ -98,18 +98,6 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         }
     }
     gpu.check()
-}
-
-fn load(name: &str) -> Result<Scene, String> {
-    match name.strip_prefix("sample:") {
-        Some(sample) => samples::by_name(sample, 0.0).ok_or_else(|| {
-            format!(
-                "no sample is called {sample:?}; there are {}",
-                samples::NAMES.join(", ")
-            )
-        }),
-        None => gltf_scene::load(Path::new(name), 0.0),
-    }
 }
 
 /// One line of the table.

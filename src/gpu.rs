@@ -71,6 +71,21 @@ pub(crate) fn texture_bytes(size: [u32; 2], layers: u32, format: wgpu::TextureFo
 
 /// Creates a texture after checking it against the device's limits.
 pub(crate) fn texture(device: &wgpu::Device, spec: &TextureSpec) -> Result<wgpu::Texture, Error> {
+    texture_with_mips(device, spec, 1)
+}
+
+/// Bytes of such a texture with mips.
+pub(crate) fn mip_bytes(spec: &TextureSpec, levels: u32) -> u64 {
+    let level = |l: u32| texture_bytes(spec.size.map(|s| (s >> l).max(1)), spec.layers, spec.format);
+    (0..levels).map(level).sum()
+}
+
+/// The same with mips.
+pub(crate) fn texture_with_mips(
+    device: &wgpu::Device,
+    spec: &TextureSpec,
+    levels: u32,
+) -> Result<wgpu::Texture, Error> {
     let limits = device.limits();
     let largest = spec.size[0].max(spec.size[1]);
     if spec.size[0] == 0 || spec.size[1] == 0 || largest > limits.max_texture_dimension_2d {
@@ -91,7 +106,7 @@ pub(crate) fn texture(device: &wgpu::Device, spec: &TextureSpec) -> Result<wgpu:
     }
     count(|c| {
         c.textures += 1;
-        c.bytes += spec.bytes();
+        c.bytes += mip_bytes(spec, levels);
     });
     Ok(device.create_texture(&wgpu::TextureDescriptor {
         label: Some(spec.label),
@@ -100,7 +115,7 @@ pub(crate) fn texture(device: &wgpu::Device, spec: &TextureSpec) -> Result<wgpu:
             height: spec.size[1],
             depth_or_array_layers: spec.layers,
         },
-        mip_level_count: 1,
+        mip_level_count: levels,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
         format: spec.format,
@@ -113,6 +128,16 @@ pub(crate) fn texture(device: &wgpu::Device, spec: &TextureSpec) -> Result<wgpu:
 pub(crate) fn array_view(texture: &wgpu::Texture) -> wgpu::TextureView {
     texture.create_view(&wgpu::TextureViewDescriptor {
         dimension: Some(wgpu::TextureViewDimension::D2Array),
+        ..Default::default()
+    })
+}
+
+/// A view of one mip level of all layers.
+pub(crate) fn level_view(texture: &wgpu::Texture, level: u32) -> wgpu::TextureView {
+    texture.create_view(&wgpu::TextureViewDescriptor {
+        dimension: Some(wgpu::TextureViewDimension::D2Array),
+        base_mip_level: level,
+        mip_level_count: Some(1),
         ..Default::default()
     })
 }
@@ -200,6 +225,8 @@ pub(crate) enum Slot {
     UintArray,
     /// `texture_storage_2d<.., write>`.
     StorageTexture(wgpu::TextureFormat),
+    /// `texture_storage_2d_array<.., write>`.
+    StorageArray(wgpu::TextureFormat),
     Sampler,
 }
 
@@ -243,6 +270,11 @@ pub(crate) fn layout(
                     access: wgpu::StorageTextureAccess::WriteOnly,
                     format,
                     view_dimension: flat,
+                },
+                Slot::StorageArray(format) => wgpu::BindingType::StorageTexture {
+                    access: wgpu::StorageTextureAccess::WriteOnly,
+                    format,
+                    view_dimension: array,
                 },
                 Slot::Sampler => wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
             },

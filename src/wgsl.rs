@@ -42,12 +42,46 @@ pub(crate) const PHOTON_EMITTER: &str = compose![
     "common/hash.wgsl",
 ];
 
+pub(crate) const DEPTH_HIERARCHY_BUILD_MEASURE: &str = compose![
+    "pass/depth_hierarchy_build/measure_texels.wgsl",
+    "common/depth_range.wgsl",
+    "common/env_map.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+];
+
+pub(crate) const DEPTH_HIERARCHY_BUILD_JOIN: &str =
+    compose!["pass/depth_hierarchy_build/join_cells.wgsl", "common/depth_range.wgsl"];
+
+pub(crate) const IMAGE_SPACE_TRACER_RAYS: &str = compose![
+    "pass/image_space_tracer/trace_rays.wgsl",
+    "pass/image_space_tracer/trace_ray.wgsl",
+    "pass/image_space_tracer/false_position.wgsl",
+    "pass/image_space_tracer/march.wgsl",
+    "pass/image_space_tracer/hierarchy.wgsl",
+    "pass/image_space_tracer/nearest.wgsl",
+    "pass/image_space_tracer/ordered.wgsl",
+    "common/depth_range.wgsl",
+    "common/env_map.wgsl",
+    "common/hit.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+];
+
 pub(crate) const IMAGE_SPACE_TRACER: &str = compose![
     "pass/image_space_tracer/trace_ray.wgsl",
     "pass/image_space_tracer/false_position.wgsl",
-    "pass/image_space_tracer/ordered_march.wgsl",
+    "pass/image_space_tracer/march.wgsl",
+    "pass/image_space_tracer/hierarchy.wgsl",
+    "pass/image_space_tracer/nearest.wgsl",
+    "pass/image_space_tracer/ordered.wgsl",
     "pass/photon_walk/walk_photons.wgsl",
     "pass/photon_walk/params.wgsl",
+    "common/depth_range.wgsl",
     "common/env_map.wgsl",
     "common/hit.wgsl",
     "common/photon.wgsl",
@@ -197,11 +231,20 @@ pub(crate) const TONE_MAP: &str = compose!["pass/tone_map.wgsl", "common/full_sc
 
 pub(crate) const ENV_MAP_SELECTOR: &str = compose![
     "pass/env_map_selector/select_maps.wgsl",
+    "pass/env_map_selector/samples.wgsl",
     "pass/env_map_selector/candidate.wgsl",
+    "common/surface_sample.wgsl",
     "common/surface_texel.wgsl",
     "common/octahedral.wgsl",
     "common/reflectance.wgsl",
     "common/cube_face.wgsl",
+];
+
+pub(crate) const ENV_MAP_SELECTOR_SAMPLES: &str = compose![
+    "pass/env_map_selector/pick_samples.wgsl",
+    "common/surface_sample.wgsl",
+    "common/photon.wgsl",
+    "common/octahedral.wgsl",
 ];
 
 pub(crate) const ENV_MAP_SELECTOR_CLEAR: &str =
@@ -246,7 +289,10 @@ pub(crate) const BVH_FUNCTIONS: &str = compose![
 pub const MODULES: &[(&str, &str)] = &[
     ("MeshGeometry", MESH_GEOMETRY),
     ("PhotonEmitter", PHOTON_EMITTER),
+    ("DepthHierarchyBuild measure", DEPTH_HIERARCHY_BUILD_MEASURE),
+    ("DepthHierarchyBuild join", DEPTH_HIERARCHY_BUILD_JOIN),
     ("ImageSpaceTracer", IMAGE_SPACE_TRACER),
+    ("ImageSpaceTracer rays", IMAGE_SPACE_TRACER_RAYS),
     ("ImageSpaceTracer list", IMAGE_SPACE_TRACER_LIST),
     #[cfg(feature = "bvh")]
     ("BvhTracer", BVH_TRACER),
@@ -264,6 +310,7 @@ pub const MODULES: &[(&str, &str)] = &[
     ("Accumulator", ACCUMULATOR),
     ("ToneMap", TONE_MAP),
     ("EnvMapSelector", ENV_MAP_SELECTOR),
+    ("EnvMapSelector samples", ENV_MAP_SELECTOR_SAMPLES),
     ("EnvMapSelector clear", ENV_MAP_SELECTOR_CLEAR),
     ("TraceStatistics", TRACE_STATISTICS),
     #[cfg(all(feature = "bvh", feature = "reference"))]

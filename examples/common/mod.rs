@@ -11,6 +11,8 @@ pub(crate) mod difference;
 pub(crate) mod exr_file;
 pub(crate) mod gltf_scene;
 pub(crate) mod lettering;
+#[cfg(feature = "samples")]
+pub(crate) mod named_scene;
 pub(crate) mod offline;
 pub(crate) mod picture;
 pub(crate) mod progress;

@@ -4,9 +4,11 @@
 const HIT_SURFACE: u32 = 1u;
 const HIT_ESCAPED: u32 = 2u;
 const HIT_LOST: u32 = 3u;
+const HIT_TENTATIVE: u32 = 4u;
 
 struct Hit {
-    // HIT_SURFACE: all else holds. HIT_ESCAPED: there is nothing. HIT_LOST: the tracer cannot tell.
+    // HIT_SURFACE: all else holds. HIT_TENTATIVE: the same, but a surer tracer may find otherwise. HIT_ESCAPED: there is
+    // nothing. HIT_LOST: the tracer cannot tell.
     kind: u32,
     distance: f32,
     // Unit frame

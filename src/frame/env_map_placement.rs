@@ -1,14 +1,15 @@
 //! Where environment maps stand, and when the selection of their places is brought up to date.
 //!
-//! A selection starts with the first frame and arrives a frame or two later; until then maps stand at the first
-//! candidates, those at invalid ones switched off. After geometry has changed, a part of the candidates is captured anew
+//! A selection starts with the first frame, by area, and arrives a frame or two later; until then maps stand at the first
+//! candidates, those at invalid ones switched off. Once a frame has traced photons, places are selected anew by what these
+//! reach. After geometry has changed, a part of the candidates is captured anew
 //! each frame, and each full round ends with a maintenance step, until nothing changes any more.
 
 use crate::pass::{
-    EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings, SelectBlockingInputs,
+    CoverageMeasure, EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings, SelectBlockingInputs,
     Selection, SelectionStep,
 };
-use crate::resource::{CaptureView, EnvMaps, Geometry};
+use crate::resource::{CaptureView, EnvMaps, Geometry, Photons};
 use crate::scene::{SceneBounds, UnitFrame};
 use crate::{Error, Timestamps};
 use glam::{DVec3, Vec3};
@@ -45,6 +46,8 @@ struct OngoingSelection {
     last_region: SceneBounds,
     /// Whether the next frame selects anew.
     is_pending: bool,
+    /// Whether the first frame that has photons does.
+    awaits_photons: bool,
     /// Whether there is anything to maintain.
     is_started: bool,
     /// Rounds of maintenance still to go; 0: at rest.
@@ -80,6 +83,10 @@ impl SelectionContext<'_> {
     fn candidates(&self) -> Vec<Vec3> {
         let (min, max) = (self.frame.point(self.region.min), self.frame.point(self.region.max));
         EnvMapSelector::candidates(min, max, self.candidate_count())
+    }
+
+    fn goes_by_photons(&self) -> bool {
+        self.settings.measure == CoverageMeasure::Photons
     }
 
     /// As the settings say, and at least as many as there may be maps.
@@ -169,10 +176,16 @@ impl EnvMapPlacement {
         }
     }
 
-    /// What this frame does for the selection, if anything; adds the views that it draws.
-    pub(super) fn plan_frame(&self, interval: u32, views: &mut Vec<CaptureView>) -> Option<Work> {
+    /// What this frame does for the selection, if anything, and whether there are photons for it to go by; adds the views
+    /// that it draws.
+    pub(super) fn plan_frame(
+        &self,
+        settings: &EnvMapSelectorSettings,
+        has_photons: bool,
+        views: &mut Vec<CaptureView>,
+    ) -> Option<Work> {
         let ongoing = self.ongoing.as_ref()?;
-        let work = ongoing.next_work(interval)?;
+        let work = ongoing.next_work(settings.interval, has_photons)?;
         views.extend(ongoing.resources.views(work.candidates.clone()));
         Some(work)
     }
@@ -199,18 +212,20 @@ impl EnvMapPlacement {
             radius: context.frame.radius(),
             tag: ongoing.tag,
             provisional: is_provisional.then_some(inputs.env_maps),
+            photons: inputs.photons.filter(|_| context.goes_by_photons()),
             settings: context.settings,
             timestamps: inputs.timestamps,
         };
         selector.record(encoder, &mut ongoing.resources, &selector_inputs);
-        ongoing.advance(inputs.work.step);
+        ongoing.advance(inputs.work.step, context.goes_by_photons() && inputs.photons.is_none());
     }
 
-    /// Selects and waits.
+    /// Selects, by what photons of an earlier frame reach if there are any, and waits.
     pub(super) fn select_blocking(
         &mut self,
         selector: &EnvMapSelector,
         context: &SelectionContext<'_>,
+        photons: Option<&Photons>,
         geometry: &mut dyn Geometry,
     ) -> Result<(), Error> {
         self.by_hand = false;
@@ -225,10 +240,11 @@ impl EnvMapPlacement {
             frame: context.frame,
             limit: context.limit,
             tag: ongoing.tag,
+            photons,
             settings: context.settings,
         };
         let selection = selector.select_blocking(&mut ongoing.resources, &inputs, geometry)?;
-        ongoing.advance(SelectionStep::Select);
+        ongoing.advance(SelectionStep::Select, context.goes_by_photons() && photons.is_none());
         ongoing.settle(&selection);
         self.adopt(&selection, context.frame);
         Ok(())
@@ -248,6 +264,8 @@ pub(super) struct PlacementInputs<'a> {
     pub(super) work: &'a Work,
     pub(super) views: &'a [CaptureView],
     pub(super) env_maps: &'a EnvMaps,
+    /// Of an earlier frame.
+    pub(super) photons: Option<&'a Photons>,
     pub(super) timestamps: Option<&'a Timestamps>,
 }
 
@@ -259,6 +277,7 @@ impl OngoingSelection {
             frame: *context.frame,
             last_region: *context.region,
             is_pending: true,
+            awaits_photons: false,
             is_started: false,
             rounds: 0,
             part: 0,
@@ -297,9 +316,9 @@ impl OngoingSelection {
         }
     }
 
-    fn next_work(&self, interval: u32) -> Option<Work> {
+    fn next_work(&self, interval: u32, has_photons: bool) -> Option<Work> {
         let count = self.resources.candidates().len();
-        if self.is_pending {
+        if self.is_pending || (self.awaits_photons && has_photons) {
             return Some(Work {
                 candidates: 0..count,
                 step: SelectionStep::Select,
@@ -320,8 +339,8 @@ impl OngoingSelection {
         })
     }
 
-    /// Notes that a step was recorded.
-    fn advance(&mut self, step: SelectionStep) {
+    /// Notes that a step was recorded, and whether it lacked photons to go by.
+    fn advance(&mut self, step: SelectionStep, lacked_photons: bool) {
         match step {
             SelectionStep::Capture => {
                 self.part += 1;
@@ -329,6 +348,7 @@ impl OngoingSelection {
             }
             SelectionStep::Select => {
                 (self.is_pending, self.is_started) = (false, true);
+                self.awaits_photons = lacked_photons;
                 (self.rounds, self.settles_from) = (MOST_ROUNDS, self.tag);
             }
             SelectionStep::Maintain => self.rounds = self.rounds.saturating_sub(1),

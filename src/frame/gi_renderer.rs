@@ -9,7 +9,7 @@ use super::env_map_placement::{EnvMapPlacement, PlacementInputs, SelectionContex
 use super::indirect_scene::{IndirectScene, PhotonInputs, PhotonPasses};
 use super::{Plan, Settings, Stage};
 use crate::pass::{
-    Composite, CompositeInputs, CompositeResources, CompositeSettings, DirectLight, DirectLightInputs,
+    Composite, CompositeInputs, CompositeResources, CompositeSettings, CoverageMeasure, DirectLight, DirectLightInputs,
     DirectLightResources, EnvMapSelector, GBufferCapture, GBufferCaptureInputs, NearestOccluder, NearestOccluderInputs,
     NearestOccluderResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, ShadowMapCapture,
     ShadowMapCaptureInputs, ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources, Upsampler,
@@ -43,6 +43,8 @@ pub struct GiRenderer {
     views: Vec<CaptureView>,
     light_views: std::ops::Range<usize>,
     env_map_views: std::ops::Range<usize>,
+    /// That photons were last traced in.
+    photons_frame: Option<UnitFrame>,
     /// This frame's share of the selection, and its views.
     selection: Option<(Work, std::ops::Range<usize>)>,
 }
@@ -164,7 +166,7 @@ impl GiRenderer {
             soft_shadow: SoftShadow::new(device),
             direct_light: DirectLight::new(device),
             env_map_selector: EnvMapSelector::new(device),
-            photons: PhotonPasses::new(device, settings.tracer_kind),
+            photons: PhotonPasses::new(device, settings),
             photon_splatter: PhotonSplatter::new(device, &settings.splatter_config)?,
             upsampler: Upsampler::new(device),
             composite: Composite::new(device, wgpu::TextureFormat::Rgba32Float),
@@ -182,6 +184,7 @@ impl GiRenderer {
             views: Vec::new(),
             light_views: 0..0,
             env_map_views: 0..0,
+            photons_frame: None,
             selection: None,
         })
     }
@@ -261,6 +264,7 @@ impl GiRenderer {
         } else if self.indirect.is_none() {
             PhotonSplatterResources::check(device, &settings.splatter_config, settings.photons, settings.bounces)?;
             self.generation = next_generation();
+            self.photons_frame = None;
             self.indirect = Some(IndirectScene::new(device, settings)?);
         }
         Ok(())
@@ -289,17 +293,61 @@ impl GiRenderer {
     /// selection begins with the first frame and arrives some frames later. It prepares the geometry for views of its own:
     /// call it after `set_scene` and before `prepare`. Does nothing where the settings trace triangles alone.
     ///
+    /// Where places are chosen by what photons reach ([`CoverageMeasure::Photons`](crate::pass::CoverageMeasure)), photons are
+    /// traced for it, through maps in places chosen by area, then through better ones.
+    ///
     /// # Errors
     /// [`Error::ReadBack`], [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
     pub fn place_env_maps_blocking(&mut self, queue: &wgpu::Queue, geometry: &mut dyn Geometry) -> Result<(), Error> {
-        let has_maps = self.settings.tracer_kind.uses_env_maps();
-        let Some(state) = self.state.as_ref().filter(|_| has_maps) else {
+        /// How often photons are traced; a third time changed no selection (`docs/tracing.md`).
+        const ROUNDS: u32 = 2;
+        if !self.settings.tracer_kind.uses_env_maps() {
+            return Ok(());
+        }
+        self.select_blocking(queue, geometry, false)?;
+        if self.settings.selector.measure == CoverageMeasure::Photons && self.indirect.is_some() {
+            for _ in 0..ROUNDS {
+                self.trace_for_selection(queue, geometry)?;
+                self.select_blocking(queue, geometry, true)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn select_blocking(
+        &mut self,
+        queue: &wgpu::Queue,
+        geometry: &mut dyn Geometry,
+        by_photons: bool,
+    ) -> Result<(), Error> {
+        let Some(state) = &self.state else {
             return Ok(());
         };
         let context = selection_context(&self.device, queue, &self.settings, state);
+        let photons = self.indirect.as_ref().filter(|_| by_photons).map(|i| &i.photons);
         self.placement
-            .select_blocking(&self.passes.env_map_selector, &context, geometry)?;
+            .select_blocking(&self.passes.env_map_selector, &context, photons, geometry)?;
         self.renew_centers(queue)
+    }
+
+    /// Submits a frame of photons, in image space alone: triangles are not at hand, and where maps lose a ray there is
+    /// nothing for them to cover.
+    fn trace_for_selection(&mut self, queue: &wgpu::Queue, geometry: &mut dyn Geometry) -> Result<(), Error> {
+        self.prepare(queue, geometry, &mut [])?;
+        self.selection = None;
+        let mut encoder = self.device.create_command_encoder(&Default::default());
+        let inputs = SceneInputs {
+            queue,
+            geometry,
+            #[cfg(feature = "bvh")]
+            bvh: None,
+            sample_offset: 0,
+            timestamps: None,
+        };
+        self.record_shadow_maps(&mut encoder, &inputs);
+        self.record_photons(&mut encoder, &inputs)?;
+        queue.submit([encoder.finish()]);
+        Ok(())
     }
 
     /// Places the environment maps by hand, world space; up to [`Settings::env_map_count`]. Nothing is selected any more,
@@ -357,9 +405,10 @@ impl GiRenderer {
             self.views.extend(env_maps.views(CapturePurpose::EnvMap));
         }
         let selection_from = self.views.len();
+        let has_photons = self.traced_photons().is_some();
         let work = self
             .placement
-            .plan_frame(self.settings.selector.interval, &mut self.views);
+            .plan_frame(&self.settings.selector, has_photons, &mut self.views);
         self.selection = work.map(|w| (w, selection_from..self.views.len()));
         number(&mut self.views);
         for (camera, view) in cameras.iter_mut().zip(&self.views) {
@@ -384,6 +433,10 @@ impl GiRenderer {
         self.check_triangles(inputs)?;
         self.record_shadow_maps(encoder, inputs);
         self.record_selection(encoder, inputs);
+        self.record_photons(encoder, inputs)
+    }
+
+    fn record_photons(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) -> Result<(), Error> {
         if let (Some(direct), Some(indirect)) = (&self.direct, &mut self.indirect) {
             let photon_inputs = PhotonInputs {
                 scene: inputs,
@@ -392,9 +445,16 @@ impl GiRenderer {
                 shadow_maps: &direct.shadow_maps,
                 views: &self.views[self.env_map_views.clone()],
             };
-            indirect.record(encoder, &self.passes.photons, &photon_inputs);
+            indirect.record(encoder, &self.passes.photons, &photon_inputs)?;
+            self.photons_frame = self.state.as_ref().map(|s| s.frame);
         }
         Ok(())
+    }
+
+    /// Photons of an earlier frame, if they are in the present unit frame.
+    fn traced_photons(&self) -> Option<&Photons> {
+        let (state, frame) = (self.state.as_ref()?, self.photons_frame.as_ref()?);
+        self.photons().filter(|_| frame.maps_like(&state.frame))
     }
 
     #[cfg(feature = "bvh")]
@@ -450,6 +510,11 @@ impl GiRenderer {
                 work: &work,
                 views: &self.views[views],
                 env_maps,
+                photons: self
+                    .photons_frame
+                    .filter(|frame| frame.maps_like(&state.frame))
+                    .and(self.indirect.as_ref())
+                    .map(|i| &i.photons),
                 timestamps: inputs.timestamps,
             };
             self.placement

@@ -5,15 +5,17 @@ use crate::Error;
 #[cfg(feature = "bvh")]
 use crate::pass::{BvhTracer, BvhTracerInputs, BvhTracerResources};
 use crate::pass::{
-    EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources, ImageSpaceTracer, ImageSpaceTracerInputs,
+    DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources, ImageSpaceTracer, ImageSpaceTracerInputs,
     ImageSpaceTracerResources, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources, SharedHop,
 };
-use crate::resource::{CaptureView, EnvMaps, Lights, LostRays, Photons, ShadowMaps};
+use crate::resource::{CaptureView, DepthHierarchy, EnvMaps, Lights, LostRays, Photons, ShadowMaps};
 
 /// From the lights to the last surface.
 #[derive(Debug)]
 pub(super) struct PhotonPasses {
     env_map_capture: EnvMapCapture,
+    /// If the method needs it.
+    depth_hierarchy_build: Option<DepthHierarchyBuild>,
     photon_emitter: PhotonEmitter,
     /// Those that the settings use.
     image_space_tracer: Option<ImageSpaceTracer>,
@@ -38,6 +40,8 @@ pub(super) struct IndirectScene {
 struct ImageSpaceScene {
     env_maps: EnvMaps,
     capture: EnvMapCaptureResources,
+    /// If the method needs it.
+    hierarchy: Option<(DepthHierarchy, DepthHierarchyBuildResources)>,
     tracer: ImageSpaceTracerResources,
 }
 
@@ -53,11 +57,13 @@ pub(super) struct PhotonInputs<'a> {
 }
 
 impl PhotonPasses {
-    pub(super) fn new(device: &wgpu::Device, kind: TracerKind) -> Self {
+    pub(super) fn new(device: &wgpu::Device, settings: &Settings) -> Self {
+        let (kind, method) = (settings.tracer_kind, settings.trace_method);
         Self {
             env_map_capture: EnvMapCapture::new(),
+            depth_hierarchy_build: needs_hierarchy(settings).then(|| DepthHierarchyBuild::new(device)),
             photon_emitter: PhotonEmitter::new(device),
-            image_space_tracer: kind.uses_env_maps().then(|| ImageSpaceTracer::new(device)),
+            image_space_tracer: kind.uses_env_maps().then(|| ImageSpaceTracer::new(device, method)),
             #[cfg(feature = "bvh")]
             bvh_tracer: kind.uses_triangles().then(|| BvhTracer::new(device)),
         }
@@ -71,8 +77,11 @@ impl IndirectScene {
         let shared_hops = if is_shared { settings.bounces } else { 0 };
         let photons = Photons::new(device, settings.photons, settings.bounces)?;
         let image_space = || {
+            let env_maps = EnvMaps::new(device, settings.env_map_count, settings.env_map_size)?;
+            let hierarchy = || Ok((DepthHierarchy::new(device, &env_maps)?, DepthHierarchyBuildResources::new()));
             Ok(ImageSpaceScene {
-                env_maps: EnvMaps::new(device, settings.env_map_count, settings.env_map_size)?,
+                hierarchy: needs_hierarchy(settings).then(hierarchy).transpose()?,
+                env_maps,
                 capture: EnvMapCaptureResources::new(device, settings.env_map_size)?,
                 tracer: ImageSpaceTracerResources::for_shared_hops(device, shared_hops)?,
             })
@@ -110,7 +119,7 @@ impl IndirectScene {
         encoder: &mut wgpu::CommandEncoder,
         passes: &PhotonPasses,
         inputs: &PhotonInputs<'_>,
-    ) {
+    ) -> Result<(), Error> {
         let scene = inputs.scene;
         if let Some(image_space) = &mut self.image_space {
             let capture_inputs = EnvMapCaptureInputs {
@@ -122,6 +131,14 @@ impl IndirectScene {
             passes
                 .env_map_capture
                 .record(encoder, &mut image_space.capture, &capture_inputs);
+            if let (Some(build), Some((hierarchy, own))) = (&passes.depth_hierarchy_build, &mut image_space.hierarchy) {
+                let build_inputs = DepthHierarchyBuildInputs {
+                    env_maps: &image_space.env_maps,
+                    hierarchy,
+                    timestamps: scene.timestamps,
+                };
+                build.record(encoder, own, &build_inputs);
+            }
         }
         let emitter_inputs = PhotonEmitterInputs {
             queue: scene.queue,
@@ -135,12 +152,9 @@ impl IndirectScene {
             .photon_emitter
             .record(encoder, &mut self.emitter, &emitter_inputs);
         if self.lost.is_none() {
-            self.record_walk(encoder, passes, inputs, None);
-            return;
+            return self.record_walk(encoder, passes, inputs, None);
         }
-        for hop in 1..=self.photons.bounces() {
-            self.record_walk(encoder, passes, inputs, Some(hop));
-        }
+        (1..=self.photons.bounces()).try_for_each(|hop| self.record_walk(encoder, passes, inputs, Some(hop)))
     }
 
     /// Of each tracer that there is, the whole walk or one hop.
@@ -150,7 +164,7 @@ impl IndirectScene {
         passes: &PhotonPasses,
         inputs: &PhotonInputs<'_>,
         hop: Option<u32>,
-    ) {
+    ) -> Result<(), Error> {
         let scene = inputs.scene;
         let lost = self.lost.as_ref();
         let shared = hop.zip(lost).map(|(number, lost)| SharedHop { number, lost });
@@ -158,13 +172,14 @@ impl IndirectScene {
             let tracer_inputs = ImageSpaceTracerInputs {
                 queue: scene.queue,
                 env_maps: &image_space.env_maps,
+                hierarchy: image_space.hierarchy.as_ref().map(|h| &h.0),
                 photons: &self.photons,
                 shared,
                 sample_offset: scene.sample_offset,
                 settings: &inputs.settings.tracer,
                 timestamps: scene.timestamps,
             };
-            tracer.record(encoder, &mut image_space.tracer, &tracer_inputs);
+            tracer.record(encoder, &mut image_space.tracer, &tracer_inputs)?;
         }
         #[cfg(feature = "bvh")]
         if let (Some(tracer), Some(own), Some(geometry)) = (&passes.bvh_tracer, &mut self.bvh_tracer, scene.bvh) {
@@ -179,6 +194,7 @@ impl IndirectScene {
             };
             tracer.record(encoder, own, &tracer_inputs);
         }
+        Ok(())
     }
 
     /// Bytes by resource.
@@ -188,6 +204,9 @@ impl IndirectScene {
         if let Some(image_space) = &self.image_space {
             let maps = image_space.env_maps.memory_use() + image_space.capture.memory_use();
             list.push(("env_maps", maps));
+            if let Some((hierarchy, _)) = &image_space.hierarchy {
+                list.push(("depth_hierarchy", hierarchy.memory_use()));
+            }
             uniforms += image_space.tracer.memory_use();
         }
         #[cfg(feature = "bvh")]
@@ -200,4 +219,9 @@ impl IndirectScene {
         list.push(("uniforms", uniforms));
         list
     }
+}
+
+/// Whether rays step over depth hierarchies.
+fn needs_hierarchy(settings: &Settings) -> bool {
+    settings.tracer_kind.uses_env_maps() && settings.trace_method.needs_hierarchy()
 }

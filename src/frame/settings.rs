@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::pass::{
-    Bandwidth, EnvMapSelectorResources, EnvMapSelectorSettings, ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS,
+    Bandwidth, CoverageMeasure, EnvMapSelectorResources, EnvMapSelectorSettings, ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS,
     MAX_SELECTED, MAX_TAPS, PenumbraSearch, PhotonSplatterConfig, PhotonSplatterSettings, SoftShadowSettings,
     SplatShape, TraceMethod, UpsamplerSettings,
 };
@@ -63,8 +63,9 @@ pub struct Settings {
     pub selector: EnvMapSelectorSettings,
     /// What photons are traced through.
     pub tracer_kind: TracerKind,
-    /// How rays are traced in image space: the default method has a quarter of the paper's error at twice its time.
-    /// `roulette_from` counts for every kind of tracer.
+    /// How rays are searched for in environment maps.
+    pub trace_method: TraceMethod,
+    /// How far rays are followed. `roulette_from` counts for every kind of tracer.
     pub tracer: ImageSpaceTracerSettings,
     /// How photons are drawn: tiles in f32, or blended quads.
     pub splatter_config: PhotonSplatterConfig,
@@ -117,6 +118,7 @@ impl Settings {
             soft_shadow: SoftShadowSettings::default(),
             selector: EnvMapSelectorSettings::default(),
             tracer_kind: TracerKind::default(),
+            trace_method: TraceMethod::default(),
             tracer: ImageSpaceTracerSettings::default(),
             splatter_config: PhotonSplatterConfig::default(),
             splatter: PhotonSplatterSettings::default(),
@@ -317,6 +319,13 @@ const KNOBS: &[Knob] = &[
         .contains(&v)),
     field!("selector.clearance", "0 to 1", selector.clearance, |v| (0.0..=1.0)
         .contains(&v)),
+    choice!(
+        "selector.measure",
+        "photons or area",
+        selector.measure,
+        ["photons", CoverageMeasure::Photons],
+        ["area", CoverageMeasure::Area]
+    ),
     field!("selector.coverage_target", "0 to 1", selector.coverage_target, |v| (0.0
         ..=1.0)
         .contains(&v)),
@@ -335,14 +344,21 @@ const KNOBS: &[Knob] = &[
     },
     choice!(
         "tracer.method",
-        "paper, plane or ordered-march",
-        tracer.method,
+        "paper, plane, nearest-march, nearest-walk, ordered-march, ordered-walk or verified-walk",
+        trace_method,
         ["paper", TraceMethod::Paper],
         ["plane", TraceMethod::Plane],
-        ["ordered-march", TraceMethod::OrderedMarch]
+        ["nearest-march", TraceMethod::NearestMarch],
+        ["nearest-walk", TraceMethod::NearestWalk],
+        ["ordered-march", TraceMethod::OrderedMarch],
+        ["ordered-walk", TraceMethod::OrderedWalk],
+        ["verified-walk", TraceMethod::VerifiedWalk]
     ),
     field!("tracer.iterations", "1 to 32", tracer.iterations, |v| (1..=32)
         .contains(&v)),
+    field!("tracer.most_fetches", "0 or more; 0: no limit", tracer.most_fetches, |_| {
+        true
+    }),
     field!("tracer.roulette_from", "1 or more", tracer.roulette_from, |v| v >= 1),
     choice!(
         "splatter.shape",

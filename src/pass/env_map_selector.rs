@@ -1,20 +1,22 @@
 //! Chooses where environment maps are taken from: the few of many candidates that together see the most.
 //!
-//! Inputs: [`Geometry`], candidates. Output: a [`Selection`], a frame or two later. Each candidate is captured at 32² texels
-//! a face into one atlas. The area that a texel shows follows from its distance and normal (Yao et al. 2010, Eq. 1); for
-//! every texel a bit for each selected map says whether that map sees it too. Greedily the candidate that sees the most new
-//! is added, until there are enough maps or the coverage target is reached; then maps are swapped while that helps
-//! (section 4.1). Nothing leaves the GPU but the result, and nothing waits for it.
+//! Inputs: [`Geometry`], candidates, and photons of an earlier frame if there are any. Output: a [`Selection`], a frame or
+//! two later. Each candidate is captured at 32² texels a face into one atlas. What it sees is counted in one of two ways: in
+//! samples of the surfaces where photons arrived, or by area (Yao et al. 2010, Eq. 1), texel by texel. Greedily the candidate
+//! that sees the most new is added, until there are enough maps or the coverage target is reached; then maps are swapped
+//! while that helps (section 4.1). Nothing leaves the GPU but the result, and nothing waits for it.
 //!
-//! Cost: six coarse captures a candidate, then (maps + swaps) × candidates × 6144 texels. While a scene changes, a fifth of
-//! the candidates a frame and one swap every fifth frame keep the selection up to date. Limits: at 32² a texel is 3° wide,
-//! so thin things are missed; areas are off by some percent (`docs/accuracy.md`); 31 maps fit the bit masks.
+//! Cost: six coarse captures a candidate; by samples, a look-up for each sample and candidate, then (maps + swaps) ×
+//! candidates × samples / 32 words; by area, (maps + swaps) × candidates × 6144 texels. While a scene changes, a fifth of the
+//! candidates a frame and one swap every fifth frame keep the selection up to date. Limits: at 32² a texel is 3° wide, so
+//! thin things are missed; areas are off by some percent (`docs/accuracy.md`); 31 maps fit the bit masks.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, RenderSpec, Slot};
 use crate::halton::radical_inverse;
 use crate::read_back::{self, ReadBackRing};
 use crate::resource::{
-    CaptureMask, CapturePurpose, CaptureTargets, CaptureView, EnvMaps, Geometry, PrepareContext, SURFACE_FORMAT,
+    CaptureMask, CapturePurpose, CaptureTargets, CaptureView, EnvMaps, Geometry, Photons, PrepareContext,
+    SURFACE_FORMAT,
 };
 use crate::scene::UnitFrame;
 use crate::{Error, Timestamps, wgsl};
@@ -36,6 +38,15 @@ pub(crate) mod gpu {
         pub(crate) clearance: f32,
         pub(crate) tolerance: f32,
         pub(crate) coverage_target: f32,
+        pub(crate) sample_count: u32,
+    }
+
+    /// Twin of `SurfaceSample` in `shaders/common/surface_sample.wgsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct SurfaceSample {
+        pub(crate) position: [f32; 3],
+        pub(crate) normal: u32,
     }
 
     /// Twin of `Sight`.
@@ -69,10 +80,11 @@ pub(crate) mod gpu {
 }
 
 /// Bindings of group 0 of `shaders/pass/env_map_selector/select_maps.wgsl`, in order.
-pub(crate) const SLOTS: [Slot; 6] = [
+pub(crate) const SLOTS: [Slot; 7] = [
     Slot::Uniform,
     Slot::UintTexture,
     Slot::Storage,
+    Slot::StorageMut,
     Slot::StorageMut,
     Slot::StorageMut,
     Slot::StorageMut,
@@ -80,6 +92,13 @@ pub(crate) const SLOTS: [Slot; 6] = [
 
 /// Bindings of its group 1.
 pub(crate) const SWITCH_SLOTS: [Slot; 1] = [Slot::StorageMut];
+
+/// Bindings of `shaders/pass/env_map_selector/pick_samples.wgsl`, in order.
+pub(crate) const SAMPLE_SLOTS: [Slot; 2] = [Slot::Storage, Slot::StorageMut];
+
+/// Samples of the surfaces that light reaches: four times as many find places that see a tenth of a percent more
+/// (`docs/tracing.md`).
+const SAMPLES: u32 = 4096;
 
 /// Texels along a face of a candidate's map (Yao et al. 2010, section 4). Twin of `CANDIDATE_SIZE`.
 pub(crate) const CANDIDATE_SIZE: u32 = 32;
@@ -102,6 +121,16 @@ const MARGIN: f64 = 0.03;
 /// Least extent of the candidates' box along any axis, as a share of the region's diagonal.
 const THINNEST: f32 = 0.1;
 
+/// What the sight of a candidate is measured in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum CoverageMeasure {
+    /// Places where photons of an earlier frame arrived: what light reaches. Until there are any, area.
+    #[default]
+    Photons,
+    /// Area (Yao et al. 2010, Eq. 1): all that can be seen from any candidate, the outside of a building too.
+    Area,
+}
+
 /// What to try, what to accept, and when enough is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnvMapSelectorSettings {
@@ -111,7 +140,9 @@ pub struct EnvMapSelectorSettings {
     pub back_face_limit: f32,
     /// A candidate nearer to a surface than this share of the region's radius sees little else.
     pub clearance: f32,
-    /// Share of what all candidates see, by area, at which no further map is added. Higher selects more maps, which cost
+    /// What is to be covered. [`EnvMapSelector`] itself goes by the photons that it is given, or not given.
+    pub measure: CoverageMeasure,
+    /// Share of what all candidates see at which no further map is added. Higher selects more maps, which cost
     /// captures and find more of what rays hit; 1: as many as there may be.
     pub coverage_target: f32,
     /// Frames over which all candidates are captured anew while the scene changes; each such round ends with one
@@ -127,6 +158,7 @@ impl Default for EnvMapSelectorSettings {
             candidates: 40,
             back_face_limit: 0.2,
             clearance: 0.03,
+            measure: CoverageMeasure::default(),
             coverage_target: 0.9999,
             interval: 5,
         }
@@ -144,7 +176,7 @@ pub struct Sight {
     pub nearest: f32,
     /// Whether it may be selected.
     pub is_valid: bool,
-    /// A(v | ∅): area of the surfaces seen, unit-frame lengths squared.
+    /// A(v | ∅): area of the surfaces seen, unit-frame lengths squared; or the number of samples seen.
     pub area: f32,
     /// A(v | C): the part that no selected map sees.
     pub unseen: f32,
@@ -157,7 +189,7 @@ pub struct Selection {
     pub candidates: Vec<usize>,
     /// Their positions, unit frame.
     pub centers: Vec<Vec3>,
-    /// Share, by area, of what valid candidates see that selected ones see.
+    /// Share, by area or in samples, of what valid candidates see that selected ones see.
     pub coverage: f32,
     /// Whether the last swap tried would have changed nothing.
     pub is_stable: bool,
@@ -185,6 +217,7 @@ pub struct EnvMapSelector {
     device: wgpu::Device,
     layout: wgpu::BindGroupLayout,
     switch_layout: wgpu::BindGroupLayout,
+    sample_layout: wgpu::BindGroupLayout,
     clear: wgpu::RenderPipeline,
     steps: Steps,
 }
@@ -207,6 +240,8 @@ struct Steps {
     keep_if_needed: wgpu::ComputePipeline,
     measure_coverage: wgpu::ComputePipeline,
     switch_maps: wgpu::ComputePipeline,
+    pick_samples: wgpu::ComputePipeline,
+    see_samples: wgpu::ComputePipeline,
 }
 
 /// Candidates, their maps, and the selection so far.
@@ -222,6 +257,7 @@ pub struct EnvMapSelectorResources {
     sights: wgpu::Buffer,
     seen_by: wgpu::Buffer,
     selection: wgpu::Buffer,
+    samples: wgpu::Buffer,
     results: ReadBackRing,
     /// Results of steps before this one belong to other candidates.
     valid_from: u32,
@@ -252,6 +288,9 @@ pub struct EnvMapSelectorInputs<'a> {
     pub tag: u32,
     /// Maps that stand at the first candidates because no result has arrived yet: those at invalid ones are switched off.
     pub provisional: Option<&'a EnvMaps>,
+    /// Photons of an earlier frame, in the same unit frame: what counts is how many of the places where they arrived are
+    /// seen. `None`: the area that is seen.
+    pub photons: Option<&'a Photons>,
     /// What to accept, and when enough is seen.
     pub settings: &'a EnvMapSelectorSettings,
     /// Sink for GPU time.
@@ -264,12 +303,13 @@ impl EnvMapSelector {
         let label = "lightfall::EnvMapSelector";
         let layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &SLOTS);
         let switch_layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &SWITCH_SLOTS);
-        let step = |label, entry_point, layouts: &[&wgpu::BindGroupLayout]| {
+        let sample_layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &SAMPLE_SLOTS);
+        let step = |label, source, entry_point, layouts: &[&wgpu::BindGroupLayout]| {
             device::compute_pipeline(
                 device,
                 &ComputeSpec {
                     label,
-                    source: wgsl::ENV_MAP_SELECTOR,
+                    source,
                     entry_point,
                     layouts,
                     constants: &[],
@@ -278,7 +318,10 @@ impl EnvMapSelector {
         };
         macro_rules! step {
             ($entry_point:literal, $($layout:expr),+) => {
-                step(concat!("lightfall::EnvMapSelector::", $entry_point), $entry_point, &[$($layout),+])
+                step!(wgsl::ENV_MAP_SELECTOR, $entry_point, $($layout),+)
+            };
+            ($source:expr, $entry_point:literal, $($layout:expr),+) => {
+                step(concat!("lightfall::EnvMapSelector::", $entry_point), $source, $entry_point, &[$($layout),+])
             };
         }
         let steps = Steps {
@@ -297,12 +340,15 @@ impl EnvMapSelector {
             keep_if_needed: step!("keep_if_needed", &layout),
             measure_coverage: step!("measure_coverage", &layout),
             switch_maps: step!("switch_maps", &layout, &switch_layout),
+            pick_samples: step!(wgsl::ENV_MAP_SELECTOR_SAMPLES, "pick_samples", &sample_layout),
+            see_samples: step!("see_samples", &layout),
         };
         Self {
             device: device.clone(),
             clear: clear_pipeline(device),
             layout,
             switch_layout,
+            sample_layout,
             steps,
         }
     }
@@ -396,6 +442,7 @@ impl EnvMapSelector {
             clearance: inputs.settings.clearance * inputs.radius,
             tolerance: TOLERANCE * inputs.radius,
             coverage_target: inputs.settings.coverage_target,
+            sample_count: inputs.photons.map_or(0, |_| SAMPLES),
         };
         inputs
             .queue
@@ -407,6 +454,7 @@ impl EnvMapSelector {
             (&resources.sights).into(),
             (&resources.seen_by).into(),
             (&resources.selection).into(),
+            (&resources.samples).into(),
         ];
         let label = "lightfall::EnvMapSelector::select";
         let group = resources.groups.get(&self.device, label, &self.layout, &bound);
@@ -414,8 +462,18 @@ impl EnvMapSelector {
             let bound = [maps.centers_buffer().into()];
             resources.groups.get(&self.device, label, &self.switch_layout, &bound)
         });
+        let sample_group = inputs.photons.map(|photons| {
+            let bound = [photons.buffer().into(), (&resources.samples).into()];
+            resources.groups.get(&self.device, label, &self.sample_layout, &bound)
+        });
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        if let Some(group) = &sample_group {
+            pass.set_bind_group(0, group, &[]);
+            pass.set_pipeline(&self.steps.pick_samples);
+            pass.dispatch_workgroups(SAMPLES.div_ceil(64), 1, 1);
+        }
         pass.set_bind_group(0, &group, &[]);
+        let by_samples = sample_group.is_some();
         let mut run = |pipeline: &wgpu::ComputePipeline, groups: u32| {
             pass.set_pipeline(pipeline);
             pass.dispatch_workgroups(groups, 1, 1);
@@ -427,21 +485,27 @@ impl EnvMapSelector {
         }
         run(&steps.inspect_candidates, count);
         run(&steps.admit_candidates, 1);
-        if !is_anew {
+        if by_samples {
+            run(&steps.see_samples, count);
+        } else if !is_anew {
             run(&steps.mark_all, count);
         }
         // In a maintenance these fill places that became invalid, and add maps where the scene has grown.
         for _ in 0..limit {
             run(&steps.sum_unseen, count);
             run(&steps.add_map, 1);
-            run(&steps.mark_newest, count);
+            if !by_samples {
+                run(&steps.mark_newest, count);
+            }
         }
         run(&steps.end_steps, 1);
         run(&steps.sum_unseen, count);
         run(&steps.begin_swaps, 1);
         for _ in 0..if is_anew { MOST_SWAPS } else { 1 } {
             run(&steps.add_for_swap, 1);
-            run(&steps.mark_newest, count);
+            if !by_samples {
+                run(&steps.mark_newest, count);
+            }
             run(&steps.sum_unseen, count);
             run(&steps.drop_map, 1);
             run(&steps.sum_unseen, count);
@@ -494,6 +558,7 @@ impl EnvMapSelector {
             radius: inputs.frame.radius(),
             tag: inputs.tag,
             provisional: None,
+            photons: inputs.photons,
             settings: inputs.settings,
             timestamps: None,
         };
@@ -516,6 +581,8 @@ pub struct SelectBlockingInputs<'a> {
     pub limit: u32,
     /// A number to know the result by.
     pub tag: u32,
+    /// As in [`EnvMapSelectorInputs::photons`].
+    pub photons: Option<&'a Photons>,
     /// What to accept, and when enough is seen.
     pub settings: &'a EnvMapSelectorSettings,
 }
@@ -532,7 +599,8 @@ impl EnvMapSelectorResources {
         let each = 16 + size_of::<gpu::SightRecord>() as u64 + 4 * CANDIDATE_TEXELS;
         let selection = size_of::<gpu::SelectionRecord>() as u64;
         let results = selection + ReadBackRing::size_in_bytes(selection);
-        texels + u64::from(candidates.max(1)) * each + results + size_of::<gpu::Params>() as u64
+        let samples = u64::from(SAMPLES) * size_of::<gpu::SurfaceSample>() as u64;
+        texels + u64::from(candidates.max(1)) * each + samples + results + size_of::<gpu::Params>() as u64
     }
 
     /// Room for up to `candidates` candidates.
@@ -590,6 +658,11 @@ impl EnvMapSelectorResources {
                 U::empty(),
             )?,
             selection: storage("lightfall::EnvMapSelector::selection", selection_bytes, U::COPY_SRC)?,
+            samples: storage(
+                "lightfall::EnvMapSelector::samples",
+                u64::from(SAMPLES) * size_of::<gpu::SurfaceSample>() as u64,
+                U::empty(),
+            )?,
             results: ReadBackRing::new(device, "lightfall::EnvMapSelector::results", selection_bytes)?,
             valid_from: 0,
             last_tag: 0,

@@ -9,6 +9,7 @@ pub(crate) mod accumulator;
 pub(crate) mod bvh_tracer;
 mod capture;
 pub(crate) mod composite;
+pub(crate) mod depth_hierarchy_build;
 pub(crate) mod direct_light;
 mod env_map_capture;
 pub(crate) mod env_map_selector;
@@ -29,15 +30,16 @@ pub use accumulator::{Accumulator, AccumulatorInputs, AccumulatorResources};
 #[cfg(feature = "bvh")]
 pub use bvh_tracer::{BvhTracer, BvhTracerInputs, BvhTracerRayInputs, BvhTracerResources, RayQuery};
 pub use composite::{Composite, CompositeInputs, CompositeResources, CompositeSettings};
+pub use depth_hierarchy_build::{DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources};
 pub use direct_light::{DirectLight, DirectLightInputs, DirectLightResources};
 pub use env_map_capture::{EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources};
 pub use env_map_selector::{
-    EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings, MAX_SELECTED,
+    CoverageMeasure, EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings, MAX_SELECTED,
     SelectBlockingInputs, Selection, SelectionStep, Sight,
 };
 pub use g_buffer_capture::{GBufferCapture, GBufferCaptureInputs};
 pub use image_space_tracer::{
-    ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, ImageSpaceTracerSettings, TraceMethod,
+    ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerRayInputs, ImageSpaceTracerResources, ImageSpaceTracerSettings, TraceMethod,
 };
 pub use nearest_occluder::{NearestOccluder, NearestOccluderInputs, NearestOccluderResources};
 pub use photon_emitter::{PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources};

@@ -7,11 +7,6 @@ use glam::Vec3;
 /// Format of one texel: see `shaders/common/surface_texel.wgsl`.
 pub(crate) const SURFACE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
-/// Six faces a map and a spare layer.
-fn layers(capacity: u32) -> u32 {
-    capacity.saturating_mul(6).saturating_add(1)
-}
-
 /// `k` cube maps as layers of one `rgba32uint` 2D array: face f of map m is layer 6 m + f, faces ordered and oriented as
 /// [`cube_face::CUBE_FACES`](super::cube_face::CUBE_FACES). One layer is spare, because wgpu's GL backend takes an
 /// array of 6 k layers for a cube map. Texel: distance from the centre (f32 bits, unit frame; 0: nothing there),
@@ -29,13 +24,18 @@ pub struct EnvMaps {
 }
 
 impl EnvMaps {
+    /// Six faces a map and a spare layer.
+    pub(super) fn layers(capacity: u32) -> u32 {
+        capacity.saturating_mul(6).saturating_add(1)
+    }
+
     const USAGE: wgpu::TextureUsages = wgpu::TextureUsages::RENDER_ATTACHMENT
         .union(wgpu::TextureUsages::TEXTURE_BINDING)
         .union(wgpu::TextureUsages::COPY_SRC);
 
     /// Bytes of `capacity` maps of `size`² texels a face, centres included.
     pub fn size_in_bytes(capacity: u32, size: u32) -> u64 {
-        gpu::texture_bytes([size; 2], layers(capacity), SURFACE_FORMAT) + 16 * u64::from(capacity.max(1))
+        gpu::texture_bytes([size; 2], Self::layers(capacity), SURFACE_FORMAT) + 16 * u64::from(capacity.max(1))
     }
 
     /// Room for `capacity` maps of `size`² texels a face.
@@ -46,7 +46,7 @@ impl EnvMaps {
         let spec = gpu::TextureSpec {
             label: "lightfall::EnvMaps",
             size: [size; 2],
-            layers: layers(capacity),
+            layers: Self::layers(capacity),
             format: SURFACE_FORMAT,
             usage: Self::USAGE,
         };

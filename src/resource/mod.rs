@@ -10,6 +10,7 @@ pub(crate) mod bvh_mesh;
 #[cfg(feature = "bvh")]
 mod bvh_tree;
 pub mod cube_face;
+mod depth_hierarchy;
 mod env_maps;
 pub(crate) mod g_buffer;
 mod geometry;
@@ -22,6 +23,7 @@ mod photons;
 mod radiance;
 mod rays;
 mod shadow_maps;
+mod surface_rays;
 #[cfg(feature = "bvh")]
 pub(crate) mod texture_arrays;
 pub(crate) mod view;
@@ -32,6 +34,8 @@ mod visibility;
 pub use bvh_geometry::MeshTree;
 #[cfg(feature = "bvh")]
 pub use bvh_geometry::{BvhGeometry, BvhGeometryConfig};
+pub use depth_hierarchy::DepthHierarchy;
+pub(crate) use depth_hierarchy::RANGE_FORMAT;
 pub use env_maps::EnvMaps;
 pub(crate) use env_maps::SURFACE_FORMAT;
 pub use g_buffer::{GBuffer, GBufferViews, NormalEncoding};
@@ -43,8 +47,9 @@ pub use mesh_geometry::MeshGeometry;
 pub use nearest_occluders::NearestOccluders;
 pub use photons::{PHOTON_BYTES, Photon, PhotonState, Photons};
 pub use radiance::Radiance;
-pub use rays::{Ray, RayHit, Rays};
+pub use rays::{Ray, RayHit, RayList, Rays};
 pub use shadow_maps::ShadowMaps;
+pub use surface_rays::{SurfaceHit, SurfaceHitKind, SurfaceRay, SurfaceRays};
 pub use view::{CameraView, CaptureMask, CapturePurpose, CaptureView};
 pub use visibility::Visibility;
 

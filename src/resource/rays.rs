@@ -2,6 +2,7 @@
 
 use crate::{Error, gpu};
 use bytemuck::{Pod, Zeroable};
+use std::marker::PhantomData;
 
 /// A ray, unit frame.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -58,16 +59,22 @@ impl RayHit {
     }
 }
 
-/// Rays on the GPU, 32 bytes each, and room for what they hit, 32 bytes each.
+/// Rays against triangles on the GPU, 32 bytes each, and room for what they hit, 32 bytes each.
+pub type Rays = RayList<Ray, RayHit>;
+
+/// A list of rays on the GPU, and room for what becomes of them: [`Rays`] or
+/// [`SurfaceRays`](super::SurfaceRays).
 #[derive(Debug)]
-pub struct Rays {
+pub struct RayList<R, H> {
     rays: wgpu::Buffer,
     hits: wgpu::Buffer,
     count: u32,
+    records: PhantomData<(R, H)>,
 }
 
-impl Rays {
-    /// Room for `count` rays. Both buffers are also `COPY_SRC`; rays may be written by [`Rays::write`], a copy or a shader.
+impl<R: Pod, H: Pod> RayList<R, H> {
+    /// Room for `count` rays. Both buffers are also `COPY_SRC`; rays may be written by [`RayList::write`], a copy or a
+    /// shader.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] for more than one storage binding holds.
@@ -76,9 +83,10 @@ impl Rays {
         let usage = U::STORAGE | U::COPY_DST | U::COPY_SRC;
         let bytes = |size: usize| u64::from(count.max(1)) * size as u64;
         Ok(Self {
-            rays: gpu::buffer(device, "lightfall::Rays::rays", bytes(size_of::<Ray>()), usage)?,
-            hits: gpu::buffer(device, "lightfall::Rays::hits", bytes(size_of::<RayHit>()), usage)?,
+            rays: gpu::buffer(device, "lightfall::RayList::rays", bytes(size_of::<R>()), usage)?,
+            hits: gpu::buffer(device, "lightfall::RayList::hits", bytes(size_of::<H>()), usage)?,
             count,
+            records: PhantomData,
         })
     }
 
@@ -86,7 +94,7 @@ impl Rays {
     ///
     /// # Errors
     /// [`Error::CountMismatch`] unless there are as many as there is room for.
-    pub fn write(&self, queue: &wgpu::Queue, rays: &[Ray]) -> Result<(), Error> {
+    pub fn write(&self, queue: &wgpu::Queue, rays: &[R]) -> Result<(), Error> {
         if rays.len() != self.count as usize {
             return Err(Error::CountMismatch {
                 what: "rays written over a list of rays",
@@ -98,12 +106,12 @@ impl Rays {
         Ok(())
     }
 
-    /// An array of [`Ray`].
+    /// An array of the rays.
     pub fn buffer(&self) -> &wgpu::Buffer {
         &self.rays
     }
 
-    /// An array of [`RayHit`].
+    /// An array of what became of them.
     pub fn hits(&self) -> &wgpu::Buffer {
         &self.hits
     }

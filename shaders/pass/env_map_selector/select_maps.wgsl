@@ -1,5 +1,7 @@
 // The selection itself: which candidates together see the most (Yao et al. 2010, section 4). Every step is a dispatch; a
 // step that finds the work done returns at once, so that the host records them all without knowing how many it takes.
+//
+// What is seen is measured by area, texel by texel, or in samples of the surfaces that light reaches (samples.wgsl).
 
 struct Params {
     candidate_count: u32,
@@ -15,6 +17,8 @@ struct Params {
     // How far behind a texel's plane a point may lie and still be seen, unit frame
     tolerance: f32,
     coverage_target: f32,
+    // 0: by area
+    sample_count: u32,
 }
 
 // What one candidate sees.
@@ -24,7 +28,7 @@ struct Sight {
     // f32 bits of the nearest distance; all ones if there is none
     nearest: u32,
     is_valid: u32,
-    // A(v | nothing): area seen
+    // A(v | nothing): area, or number of samples, seen
     area: f32,
     // Part of it that no selected map sees
     unseen: f32,
@@ -53,9 +57,11 @@ struct Selection {
 @group(0) @binding(1) var atlas: texture_2d<u32>;
 @group(0) @binding(2) var<storage, read> centers: array<vec4f>;
 @group(0) @binding(3) var<storage, read_write> sights: array<Sight>;
-// For each texel of each candidate, one bit for each selected map that sees its surface
+// By area: for each texel of each candidate, one bit for each selected map that sees its surface. By samples: for each
+// candidate, one bit for each sample that it sees
 @group(0) @binding(4) var<storage, read_write> seen_by: array<u32>;
 @group(0) @binding(5) var<storage, read_write> selection: Selection;
+@group(0) @binding(6) var<storage, read_write> samples: array<SurfaceSample>;
 // Centres of environment maps in use, w: 1 on, 0 off
 @group(1) @binding(0) var<storage, read_write> map_centers: array<vec4f>;
 
@@ -232,6 +238,14 @@ fn sum_unseen(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
     }
     let bit = bit_of_candidate(candidate);
     let others = selection.selected & ~select(0u, 1u << (bit & 31u), bit != NONE);
+    if params.sample_count > 0u {
+        let counts = sum_lanes(lane, samples_unseen(candidate, lane, others));
+        if lane == 0u {
+            sights[candidate].unseen = counts.x;
+            sights[candidate].own = counts.y;
+        }
+        return;
+    }
     var sum = vec2f(0.0);
     for (var i = lane; i < CANDIDATE_TEXELS; i += LANES) {
         let seen = seen_by[candidate * CANDIDATE_TEXELS + i] & selection.selected;
@@ -248,7 +262,10 @@ fn sum_unseen(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
 // Of what valid candidates see, the share that selected maps see.
 fn coverage(lane: u32) -> f32 {
     var area = vec2f(0.0);
-    for (var i = lane; i < params.candidate_count; i += LANES) {
+    if params.sample_count > 0u {
+        area = samples_uncovered(lane);
+    }
+    for (var i = lane; i < params.candidate_count && params.sample_count == 0u; i += LANES) {
         area += select(vec2f(0.0), vec2f(sights[i].unseen, sights[i].area), sights[i].is_valid == 1u);
     }
     let total = sum_lanes(lane, area);
@@ -284,7 +301,8 @@ fn add_map(@builtin(local_invocation_index) lane: u32) {
         return;
     }
     let count = countOneBits(selection.selected);
-    if count >= params.limit || addition == NONE || (count > 0u && is_satisfied(covered)) {
+    let sees_nothing = addition != NONE && count == 0u && sights[addition].unseen <= 0.0;
+    if count >= params.limit || addition == NONE || sees_nothing || (count > 0u && is_satisfied(covered)) {
         selection.is_done = 1u;
     } else {
         add(addition);

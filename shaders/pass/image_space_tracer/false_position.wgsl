@@ -69,6 +69,7 @@ fn false_position_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
                 continue;
             }
             asked++;
+            trace_maps++;
             let hit = false_position_map(map, x, r);
             if hit.kind == HIT_SURFACE && (best.kind != HIT_SURFACE || hit.distance < best.distance) {
                 best = hit;

@@ -1,4 +1,7 @@
-// Ray against k environment maps: what the two ways of searching share, and the choice between them.
+// Ray against k environment maps: what the ways of searching share, and the choice between them.
+//
+// Walking along the ray, a point is in front of a map's surface, so the map vouches for the space up to it, or behind it,
+// so the map knows nothing there.
 
 struct Params {
     map_count: u32,
@@ -6,6 +9,8 @@ struct Params {
     iterations: u32,
     // 1 - cos of the largest angle that the paper's test accepts
     epsilon: f32,
+    // Most fetches of the hierarchical walk for a ray; what it has not found by then it cannot tell
+    most_fetches: u32,
 }
 
 @group(1) @binding(0) var<uniform> params: Params;
@@ -13,12 +18,18 @@ struct Params {
 // w: 1 where the map is to be asked, 0 where it is switched off
 @group(1) @binding(2) var<storage, read> centers: array<vec4f>;
 
-// 0: false position, accepted by angle, as in the paper. 1: false position, accepted by the texel's plane.
-// 2: ordered march.
-override method: u32 = 2u;
+@group(1) @binding(3) var depth_ranges: texture_2d_array<u32>;
+
+// Twin of `TraceMethod`.
+override method: u32 = 4u;
 
 const METHOD_PAPER: u32 = 0u;
 const METHOD_PLANE: u32 = 1u;
+const METHOD_NEAREST_MARCH: u32 = 2u;
+const METHOD_NEAREST_WALK: u32 = 3u;
+const METHOD_ORDERED_MARCH: u32 = 4u;
+const METHOD_ORDERED_WALK: u32 = 5u;
+const METHOD_VERIFIED_WALK: u32 = 6u;
 
 // Rays leave a surface from this far above it, along its geometric normal, unit frame.
 const TRACE_OFFSET: f32 = 0x1p-12;
@@ -90,10 +101,40 @@ fn trace_sees(map: u32, x: vec3f, n: vec3f) -> bool {
     return texel.surface.distance > 0.0 && dot(texel.surface.normal, offset) >= -behind;
 }
 
+// What one map says of a stretch of a ray.
+struct MapTrace {
+    // HIT_SURFACE: `hit` is certain. HIT_ESCAPED: all of it is free. HIT_LOST: free up to `free`, unknown beyond.
+    kind: u32,
+    free: f32,
+    // The first crossing found, certain or not; HIT_LOST if there is none
+    hit: Hit,
+}
+
+// What this ray has cost so far.
+var<private> trace_steps: u32;
+var<private> trace_maps: u32;
+
+// What a map says of the ray from `start` to `end`, given whether it sees the point at the start; x is relative to the
+// map's centre, and so is the hit.
+fn trace_map(map: u32, x: vec3f, r: vec3f, start: f32, end: f32, starts_in_front: bool) -> MapTrace {
+    trace_maps++;
+    if method == METHOD_ORDERED_MARCH || method == METHOD_NEAREST_MARCH {
+        return march_map(map, x, r, start, end, starts_in_front);
+    }
+    return hierarchy_map(map, x, r, start, end, starts_in_front);
+}
+
 fn trace_ray(position: vec3f, normal: vec3f, r: vec3f) -> Hit {
     let origin = position + TRACE_OFFSET * normal;
-    if method <= METHOD_PLANE {
-        return false_position_trace(origin, normal, r);
+    switch method {
+        case METHOD_PAPER, METHOD_PLANE: {
+            return false_position_trace(origin, normal, r);
+        }
+        case METHOD_NEAREST_MARCH, METHOD_NEAREST_WALK: {
+            return nearest_trace(origin, normal, r);
+        }
+        default: {
+            return ordered_trace(origin, normal, r);
+        }
     }
-    return ordered_march_trace(origin, normal, r);
 }

@@ -31,14 +31,14 @@ fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) ->
     let local = sampling_cosine(random_pair(sequence_index, 2u * bounce));
     let direction = normalize(sampling_frame(normal) * local);
     let hit = trace_ray(photon.position, normal, direction);
-    if hit.kind != HIT_SURFACE {
+    if hit.kind != HIT_SURFACE && hit.kind != HIT_TENTATIVE {
         return photon_gone(select(PHOTON_LOST, PHOTON_ESCAPED, hit.kind == HIT_ESCAPED), flux, direction, photon.light);
     }
     let cosines = local.z * max(0.0, -dot(hit.normal, direction));
     let distance = max(hit.distance, WALK_SHORTEST);
     return Photon(
         hit.position,
-        PHOTON_STORED,
+        select(PHOTON_STORED, PHOTON_STORED | PHOTON_TENTATIVE, hit.kind == HIT_TENTATIVE),
         flux,
         WALK_INVERSE_PI * cosines / (distance * distance),
         octahedral_pack(hit.normal),

@@ -1,0 +1,75 @@
+// The finest level of the hierarchy: between which inverse depths the surface of each texel lies.
+//
+// Depth is measured along the face's axis; its inverse is linear over the face wherever the surface is a plane. A texel
+// stands for its plane (stored distance and normal) over the texel's square. Where planes are grazed they would reach
+// anywhere, so a texel's range is kept within what it and its eight neighbours show, and a little more.
+
+@group(0) @binding(0) var env_maps: texture_2d_array<u32>;
+@group(0) @binding(1) var ranges: texture_storage_2d_array<r32uint, write>;
+
+// A texel's plane may leave the range of its neighbours by this share.
+const BEYOND: f32 = 0.02;
+// Neighbours show the same surface if they lie this near to the texel's plane, as a share of inverse depth.
+const AGREEMENT: f32 = 0.01;
+
+// Point of the surface that a texel shows, in the frame of a face (right, down, forward); w: 0 where there is none. The
+// texel may lie beyond the face's border: then another face shows it.
+fn neighbour(map: u32, face: u32, at: vec2i, size: u32) -> vec4f {
+    let d = cube_face_direction(face, (vec2f(at) + 0.5) / f32(size));
+    var direction = d;
+    var distance: f32;
+    if all(at >= vec2i(0)) && all(at < vec2i(i32(size))) {
+        distance = bitcast<f32>(env_map_load(map, face, vec2u(at)).x);
+    } else {
+        let point = cube_face_point(d);
+        let texel = cube_face_texel(point.uv, size);
+        direction = cube_face_direction(point.face, (vec2f(texel) + 0.5) / f32(size));
+        distance = bitcast<f32>(env_map_load(map, point.face, texel).x);
+    }
+    if distance <= 0.0 {
+        return vec4f(0.0);
+    }
+    return vec4f(env_map_face_frame(face, normalize(direction) * distance), 1.0);
+}
+
+@compute @workgroup_size(8, 8)
+fn measure_texels(@builtin(global_invocation_id) id: vec3u) {
+    let size = textureDimensions(env_maps).x;
+    if any(id.xy >= vec2u(size)) {
+        return;
+    }
+    let map = id.z / 6u;
+    let face = id.z % 6u;
+    let surface = surface_texel_unpack(env_map_load(map, face, id.xy));
+    if surface.distance <= 0.0 {
+        textureStore(ranges, id.xy, id.z, vec4u(0u));
+        return;
+    }
+    let middle = 2.0 * (vec2f(id.xy) + 0.5) / f32(size) - 1.0;
+    let plane = env_map_plane(surface, face, middle);
+    let own = dot(plane, vec3f(middle, 1.0));
+    var seen = DepthRange(own, own);
+    // Bit by quadrant; a neighbour that disagrees clears those it belongs to.
+    var agreeing = 15u;
+    for (var i = 0; i < 9; i++) {
+        let offset = vec2i(i % 3 - 1, i / 3 - 1);
+        let p = neighbour(map, face, vec2i(id.xy) + offset, size);
+        // What lies at or behind the face's plane of view is beside the face, as near as one likes.
+        let w = select(0.0, 1.0 / max(p.z, 1e-6), p.w > 0.0);
+        seen = DepthRange(min(seen.least, w), max(seen.greatest, w));
+        let expected = dot(plane, vec3f(p.xy * w, 1.0));
+        if p.w <= 0.0 || abs(expected - w) > AGREEMENT * w {
+            let left = offset.x <= 0;
+            let right = offset.x >= 0;
+            let above = offset.y <= 0;
+            let below = offset.y >= 0;
+            let quadrants = vec4<bool>(left && above, right && above, left && below, right && below);
+            agreeing &= ~dot(select(vec4u(0u), vec4u(1u, 2u, 4u, 8u), quadrants), vec4u(1u));
+        }
+    }
+    let half_texel = 1.0 / f32(size);
+    let tilt = half_texel * (abs(plane.x) + abs(plane.y));
+    let limits = vec2f(seen.least * (1.0 - BEYOND), seen.greatest * (1.0 + BEYOND));
+    let range = DepthRange(max(own - tilt, limits.x), min(own + tilt, limits.y));
+    textureStore(ranges, id.xy, id.z, vec4u(depth_range_pack(range, agreeing)));
+}

@@ -1,0 +1,22 @@
+// Samples of the surfaces that light reaches: of each run of photon slots the first photon that was stored.
+
+@group(0) @binding(0) var<storage, read> photons: array<Photon>;
+@group(0) @binding(1) var<storage, read_write> samples: array<SurfaceSample>;
+
+@compute @workgroup_size(64)
+fn pick_samples(@builtin(global_invocation_id) id: vec3u) {
+    let count = arrayLength(&samples);
+    if id.x >= count {
+        return;
+    }
+    let slots = arrayLength(&photons);
+    let run = max(slots / count, 1u);
+    var found = SurfaceSample(vec3f(2.0 * SURFACE_SAMPLE_NOWHERE), 0u);
+    for (var slot = id.x * run; slot < min((id.x + 1u) * run, slots); slot++) {
+        if (photons[slot].state & PHOTON_STATE_MASK) == PHOTON_STORED {
+            found = SurfaceSample(photons[slot].position, photons[slot].normal);
+            break;
+        }
+    }
+    samples[id.x] = found;
+}

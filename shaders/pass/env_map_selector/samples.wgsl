@@ -1,0 +1,68 @@
+// What candidates see of the surfaces that light reaches: samples of these are taken where photons arrived, so that the
+// outside of a building, which no light of its rooms reaches, does not count. One bit for each sample and candidate.
+
+fn samples_words() -> u32 {
+    return (params.sample_count + 31u) / 32u;
+}
+
+// The bits of a candidate: a workgroup for each.
+@compute @workgroup_size(256)
+fn see_samples(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let candidate = group.x;
+    var seen = 0.0;
+    for (var word = lane; word < samples_words(); word += LANES) {
+        var bits = 0u;
+        for (var bit = 0u; bit < 32u; bit++) {
+            let index = 32u * word + bit;
+            if index < params.sample_count && samples[index].position.x < SURFACE_SAMPLE_NOWHERE {
+                let sees = candidate_sees(candidate, samples[index].position, octahedral_unpack(samples[index].normal));
+                bits |= u32(sees) << bit;
+            }
+        }
+        seen_by[candidate * CANDIDATE_TEXELS + word] = bits;
+        seen += f32(countOneBits(bits));
+    }
+    let total = sum_lanes(lane, vec2f(seen, 0.0)).x;
+    if lane == 0u {
+        sights[candidate].area = total;
+        sights[candidate].unseen = total;
+        sights[candidate].own = total;
+    }
+}
+
+// Samples of a word that some of the selected maps see.
+fn samples_seen(word: u32, maps: u32) -> u32 {
+    var bits = 0u;
+    for (var left = maps; left != 0u; left &= left - 1u) {
+        bits |= seen_by[selection.chosen[countTrailingZeros(left)] * CANDIDATE_TEXELS + word];
+    }
+    return bits;
+}
+
+// This lane's part of the samples that a candidate sees, and that no selected map does; and no other selected map.
+fn samples_unseen(candidate: u32, lane: u32, others: u32) -> vec2f {
+    var counts = vec2f(0.0);
+    for (var word = lane; word < samples_words(); word += LANES) {
+        let own = seen_by[candidate * CANDIDATE_TEXELS + word];
+        counts.x += f32(countOneBits(own & ~samples_seen(word, selection.selected)));
+        counts.y += f32(countOneBits(own & ~samples_seen(word, others)));
+    }
+    return counts;
+}
+
+// This lane's part of the samples that valid candidates see, those that selected maps do not see first.
+fn samples_uncovered(lane: u32) -> vec2f {
+    var counts = vec2f(0.0);
+    for (var word = lane; word < samples_words(); word += LANES) {
+        var reachable = 0u;
+        for (var candidate = 0u; candidate < params.candidate_count; candidate++) {
+            if sights[candidate].is_valid == 1u {
+                reachable |= seen_by[candidate * CANDIDATE_TEXELS + word];
+            }
+        }
+        counts += vec2f(
+            f32(countOneBits(reachable & ~samples_seen(word, selection.selected))), f32(countOneBits(reachable)),
+        );
+    }
+    return counts;
+}
