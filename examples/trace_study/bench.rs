@@ -118,7 +118,6 @@ impl<'a> Bench<'a> {
 
     /// What rays truly meet: `None` for nothing.
     pub(crate) fn truths(&self, rays: &[SurfaceRay]) -> Result<Vec<Option<Truth>>, Error> {
-        let Gpu { device, queue, .. } = self.gpu;
         let list: Vec<_> = rays
             .iter()
             .map(|ray| Ray {
@@ -128,27 +127,58 @@ impl<'a> Bench<'a> {
                 mask: Ray::IN_ENV_MAPS,
             })
             .collect();
-        let rays_on_gpu = Rays::new(device, list.len() as u32)?;
-        rays_on_gpu.write(queue, &list)?;
+        let hits = self.trace_triangles(&list, RayQuery::Closest)?;
+        let truth = |(ray, hit): (&Ray, &RayHit)| {
+            hit.is_hit().then(|| Truth {
+                distance: hit.distance,
+                instance: hit.instance,
+                normal: self.normal(hit, ray.direction.into()),
+            })
+        };
+        Ok(list.iter().zip(&hits).map(truth).collect())
+    }
+
+    /// By triangles, which centres see the front of surfaces at these points: a bit for each, of up to 32.
+    pub(crate) fn seen_from(&self, points: &[(Vec3, Vec3)], centers: &[Vec3]) -> Result<Vec<u32>, Error> {
+        let mut seen = vec![0; points.len()];
+        for (bit, &center) in centers.iter().enumerate() {
+            let sight = |&(point, normal): &(Vec3, Vec3)| {
+                let origin = point + OFFSET * normal;
+                Ray {
+                    origin: origin.to_array(),
+                    furthest: 1.0,
+                    direction: (center - origin).to_array(),
+                    mask: Ray::IN_ENV_MAPS,
+                }
+            };
+            let rays: Vec<_> = points.iter().map(sight).collect();
+            let hits = self.trace_triangles(&rays, RayQuery::Any)?;
+            for ((bits, hit), (ray, point)) in seen.iter_mut().zip(&hits).zip(rays.iter().zip(points)) {
+                let faces = Vec3::from(ray.direction).dot(point.1) > 0.0;
+                *bits |= u32::from(faces && !hit.is_hit()) << bit;
+            }
+        }
+        Ok(seen)
+    }
+
+    fn trace_triangles(&self, rays: &[Ray], query: RayQuery) -> Result<Vec<RayHit>, Error> {
+        let Gpu { device, queue, .. } = self.gpu;
+        let list = Rays::new(device, rays.len() as u32)?;
+        list.write(queue, rays)?;
         let mut resources = BvhTracerResources::new(device)?;
         let mut encoder = device.create_command_encoder(&Default::default());
         let inputs = BvhTracerRayInputs {
             queue,
             geometry: &self.bvh,
-            rays: &rays_on_gpu,
-            query: RayQuery::Closest,
+            rays: &list,
+            query,
             timestamps: None,
         };
         self.bvh_tracer.record_rays(&mut encoder, &mut resources, &inputs);
         queue.submit([encoder.finish()]);
-        let hits: Vec<RayHit> = lightfall::read_buffer_blocking(device, queue, rays_on_gpu.hits())?;
-        let truth = |(ray, hit): (&Ray, &RayHit)| {
-            hit.is_hit().then(|| Truth {
-                distance: hit.distance,
-                normal: self.normal(hit, ray.direction.into()),
-            })
-        };
-        Ok(list.iter().zip(&hits).map(truth).collect())
+        let mut hits: Vec<RayHit> = lightfall::read_buffer_blocking(device, queue, list.hits())?;
+        hits.truncate(rays.len());
+        Ok(hits)
     }
 
     /// Geometric normal on the side that a ray hits.

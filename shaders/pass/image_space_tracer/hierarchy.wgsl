@@ -7,7 +7,7 @@
 // greatest] keeps h between least z and greatest z, where a plane seen at a grazing angle would reach anywhere.
 
 // A crossing may fall between two texels whose planes do not quite meet: by up to so many texels it still counts.
-const HIERARCHY_CRACK: f32 = 0.5;
+const HIERARCHY_CRACK: f32 = 0.25;
 // A ray starts on a surface, so that it begins with small squares.
 const HIERARCHY_FIRST_LEVEL: u32 = 2u;
 // Less depth than this there is not: a ray past the map's centre goes from one face to the opposite one.
