@@ -16,7 +16,8 @@ use lightfall::glam::{DMat4, DQuat, DVec3, Vec3};
 use lightfall::pass::{
     EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources, ImageSpaceTracer, ImageSpaceTracerInputs,
     ImageSpaceTracerResources, ImageSpaceTracerSettings, PhotonSplatter, PhotonSplatterConfig, PhotonSplatterInputs,
-    PhotonSplatterResources, PhotonSplatterSettings, Upsampler, UpsamplerInputs, UpsamplerResources, UpsamplerSettings,
+    PhotonSplatterResources, PhotonSplatterSettings, TraceMethod, Upsampler, UpsamplerInputs, UpsamplerResources,
+    UpsamplerSettings,
 };
 use lightfall::resource::{
     CameraView, CapturePurpose, CaptureView, EnvMaps, GBuffer, GBufferViews, Geometry as _, Irradiance, NormalEncoding,
@@ -73,7 +74,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut encoder = device.create_command_encoder(&Default::default());
         engine.record_g_buffer(&mut encoder);
         if let Some(walk) = &mut walk {
-            walk.record(&mut encoder, &engine, &indirect.photons);
+            walk.record(&mut encoder, &engine, &indirect.photons)?;
         }
         indirect.record(&mut encoder, &engine);
         engine.record_lighting(&mut encoder, indirect.irradiance.view());
@@ -280,7 +281,7 @@ impl Walk {
             views: Vec::new(),
             capture: EnvMapCapture::new(),
             capture_resources: EnvMapCaptureResources::new(device, Self::MAP_SIZE)?,
-            tracer: ImageSpaceTracer::new(device),
+            tracer: ImageSpaceTracer::new(device, TraceMethod::OrderedMarch),
             tracer_resources: ImageSpaceTracerResources::new(device)?,
         })
     }
@@ -301,7 +302,12 @@ impl Walk {
     }
 
     /// Captures what surrounds the centres and carries the photons on, hop after hop.
-    pub(crate) fn record(&mut self, encoder: &mut wgpu::CommandEncoder, engine: &Engine, photons: &Photons) {
+    pub(crate) fn record(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        engine: &Engine,
+        photons: &Photons,
+    ) -> Result<(), Error> {
         let inputs = EnvMapCaptureInputs {
             env_maps: &self.env_maps,
             geometry: engine,
@@ -312,12 +318,14 @@ impl Walk {
         let inputs = ImageSpaceTracerInputs {
             queue: &engine.queue,
             env_maps: &self.env_maps,
+            // The march needs none.
+            hierarchy: None,
             photons,
             shared: None,
             sample_offset: 0,
             settings: &ImageSpaceTracerSettings::default(),
             timestamps: None,
         };
-        self.tracer.record(encoder, &mut self.tracer_resources, &inputs);
+        self.tracer.record(encoder, &mut self.tracer_resources, &inputs)
     }
 }

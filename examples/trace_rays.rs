@@ -15,11 +15,11 @@ mod common;
 use clap::Parser;
 use common::adapter::{Gpu, Wishes};
 use common::clock::Clock;
-use common::{arguments, gltf_scene};
+use common::{arguments, named_scene};
 use lightfall::glam::{DAffine3, DVec3, UVec2, Vec3, Vec3A};
 use lightfall::pass::{BvhTracer, BvhTracerRayInputs, BvhTracerResources, RayQuery};
 use lightfall::resource::{BvhGeometry, BvhGeometryConfig, Ray, RayHit, Rays};
-use lightfall::scene::{Instance, Material, Mesh, Scene, UnitFrame, samples};
+use lightfall::scene::{Instance, Material, Mesh, Scene, UnitFrame};
 use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::cwbvh::node::CwBvhNode;
@@ -27,7 +27,6 @@ use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 use obvhs::{BvhBuildParams, traverse};
 use std::f64::consts::TAU;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 /// Bytes that the GPU reads of a node, and of a triangle to test it.

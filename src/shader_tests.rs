@@ -3,12 +3,14 @@
 
 use crate::gpu::Slot;
 use crate::pass::{
-    accumulator, composite, direct_light, env_map_selector, image_space_tracer, nearest_occluder, photon_emitter,
-    photon_splatter, photon_walk, soft_shadow, tone_map, trace_statistics, upsampler,
+    accumulator, composite, depth_hierarchy_build, direct_light, env_map_selector, image_space_tracer,
+    nearest_occluder, photon_emitter, photon_splatter, photon_walk, soft_shadow, tone_map, trace_statistics, upsampler,
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
-use crate::resource::{Photon, PhotonState, g_buffer, lights, lost_rays, mesh_geometry, view};
+use crate::resource::{
+    Photon, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, g_buffer, lights, lost_rays, mesh_geometry, view,
+};
 use crate::wgsl;
 #[cfg(feature = "bvh")]
 use crate::{
@@ -233,7 +235,12 @@ fn twins() -> Vec<Twin> {
             photon_count, light_count, sample_offset, shadow_map_size, row,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "Params", image_space_tracer::gpu::Params {
-            map_count, map_size, iterations, epsilon,
+            map_count, map_size, iterations, epsilon, most_fetches,
+        }),
+        twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "ListParams", image_space_tracer::gpu::ListParams { ray_count, row }),
+        twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "SurfaceRay", SurfaceRay { position, normal, direction, _pad }),
+        twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "SurfaceHit", SurfaceHit {
+            distance, kind, normal, reflectance, fetches, maps, steps, _pad,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "WalkParams", photon_walk::gpu::WalkParams {
             photon_count, first_hop, last_hop, roulette_from, sample_offset, row,
@@ -295,7 +302,9 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::TONE_MAP, "Params", tone_map::gpu::Params { exposure, curve, inverse_gamma }),
         twin!(wgsl::ENV_MAP_SELECTOR, "Params", env_map_selector::gpu::Params {
             candidate_count, columns, limit, tag, back_face_limit, clearance, tolerance, coverage_target,
+            sample_count,
         }),
+        twin!(wgsl::ENV_MAP_SELECTOR_SAMPLES, "SurfaceSample", env_map_selector::gpu::SurfaceSample { position, normal }),
         twin!(wgsl::ENV_MAP_SELECTOR, "Sight", env_map_selector::gpu::SightRecord {
             surfaces, back_faces, nearest, is_valid, area, unseen, own, pad,
         }),
@@ -396,9 +405,11 @@ fn a_vertex_is_laid_out_as_the_vertex_stage_reads_it() {
 /// The bind group layouts of a module, by group.
 fn layouts(module: &str) -> Vec<&'static [Slot]> {
     match module {
+        "DepthHierarchyBuild measure" | "DepthHierarchyBuild join" => vec![&depth_hierarchy_build::SLOTS],
         "MeshGeometry" => vec![&mesh_geometry::SCENE_SLOTS, &mesh_geometry::MATERIAL_SLOTS],
         "PhotonEmitter" => vec![&photon_emitter::SLOTS],
         "ImageSpaceTracer" => vec![&photon_walk::SLOTS, &image_space_tracer::SLOTS],
+        "ImageSpaceTracer rays" => vec![&image_space_tracer::RAY_SLOTS, &image_space_tracer::SLOTS],
         "ImageSpaceTracer list" => vec![&image_space_tracer::LIST_SLOTS],
         #[cfg(feature = "bvh")]
         "BvhTracer" => vec![&photon_walk::SLOTS, &bvh_geometry::BVH_SLOTS, &bvh_tracer::LOST_SLOTS],
@@ -416,6 +427,7 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "Accumulator" => vec![&accumulator::SLOTS],
         "ToneMap" => vec![&tone_map::SLOTS],
         "EnvMapSelector" => vec![&env_map_selector::SLOTS, &env_map_selector::SWITCH_SLOTS],
+        "EnvMapSelector samples" => vec![&env_map_selector::SAMPLE_SLOTS],
         "EnvMapSelector clear" => vec![],
         "TraceStatistics" => vec![&trace_statistics::SLOTS],
         #[cfg(all(feature = "bvh", feature = "reference"))]
@@ -439,6 +451,7 @@ fn kind_of_slot(slot: Slot) -> String {
         Slot::FilteredTextureArray => "texture_2d_array<f32>".into(),
         Slot::UintArray => "texture_2d_array<u32>".into(),
         Slot::StorageTexture(format) => format!("texture_storage_2d<{format:?}, write>"),
+        Slot::StorageArray(format) => format!("texture_storage_2d_array<{format:?}, write>"),
         Slot::Sampler => "sampler".into(),
     }
 }
@@ -547,7 +560,7 @@ fn every_layout_stays_within_default_limits() {
         at_most(
             limits.max_storage_textures_per_shader_stage,
             "storage textures",
-            |slot| matches!(slot, Slot::StorageTexture(_)),
+            |slot| matches!(slot, Slot::StorageTexture(_) | Slot::StorageArray(_)),
         );
         at_most(limits.max_samplers_per_shader_stage, "samplers", |slot| {
             matches!(slot, Slot::Sampler)
@@ -645,8 +658,37 @@ fn light_kinds_are_the_same_on_both_sides() {
 fn trace_methods_are_the_same_on_both_sides() {
     use image_space_tracer::TraceMethod;
     let shader = Shader::new("ImageSpaceTracer", wgsl::IMAGE_SPACE_TRACER);
-    assert_eq!(shader.constant("METHOD_PAPER"), Literal::U32(TraceMethod::Paper as u32));
-    assert_eq!(shader.constant("METHOD_PLANE"), Literal::U32(TraceMethod::Plane as u32));
+    for (name, method) in [
+        ("METHOD_PAPER", TraceMethod::Paper),
+        ("METHOD_PLANE", TraceMethod::Plane),
+        ("METHOD_NEAREST_MARCH", TraceMethod::NearestMarch),
+        ("METHOD_NEAREST_WALK", TraceMethod::NearestWalk),
+        ("METHOD_ORDERED_MARCH", TraceMethod::OrderedMarch),
+        ("METHOD_ORDERED_WALK", TraceMethod::OrderedWalk),
+        ("METHOD_VERIFIED_WALK", TraceMethod::VerifiedWalk),
+    ] {
+        assert_eq!(shader.constant(name), Literal::U32(method as u32), "{name}");
+    }
+}
+
+#[test]
+fn kinds_of_hits_are_the_same_on_both_sides() {
+    let shader = Shader::new("ImageSpaceTracer rays", wgsl::IMAGE_SPACE_TRACER_RAYS);
+    for (name, kind) in [
+        ("HIT_SURFACE", SurfaceHitKind::Surface),
+        ("HIT_ESCAPED", SurfaceHitKind::Escaped),
+        ("HIT_LOST", SurfaceHitKind::Lost),
+        ("HIT_TENTATIVE", SurfaceHitKind::Tentative),
+    ] {
+        let Literal::U32(number) = shader.constant(name) else {
+            panic!("{name} is not a u32");
+        };
+        let hit = SurfaceHit {
+            kind: number,
+            ..bytemuck::Zeroable::zeroed()
+        };
+        assert_eq!(hit.kind(), kind, "{name}");
+    }
 }
 
 #[test]

@@ -89,6 +89,7 @@ impl<'a> Bench<'a> {
             frame: &self.frame,
             limit,
             tag: 1,
+            photons: None,
             settings,
         };
         let selection = self

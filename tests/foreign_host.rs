@@ -76,7 +76,7 @@ fn draw_with(engine: &Engine, indirect: &mut IndirectLight, walk: Option<&mut Wa
     let mut encoder = engine.device.create_command_encoder(&Default::default());
     engine.record_g_buffer(&mut encoder);
     if let Some(walk) = walk {
-        walk.record(&mut encoder, engine, &indirect.photons);
+        walk.record(&mut encoder, engine, &indirect.photons).unwrap();
     }
     indirect.record(&mut encoder, engine);
     engine.record_lighting(&mut encoder, indirect.irradiance.view());
@@ -761,7 +761,7 @@ fn record_everything(device: &wgpu::Device, queue: &wgpu::Queue) {
             walk.prepare(&mut engine, &indirect.frame).unwrap();
             let mut encoder = device.create_command_encoder(&Default::default());
             engine.record_g_buffer(&mut encoder);
-            walk.record(&mut encoder, &engine, &indirect.photons);
+            walk.record(&mut encoder, &engine, &indirect.photons).unwrap();
             engine.record_g_buffer(&mut encoder);
             indirect.record(&mut encoder, &engine);
             engine.record_lighting(&mut encoder, indirect.irradiance.view());

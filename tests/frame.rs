@@ -99,8 +99,11 @@ fn make_and_record_every_pass(device: &wgpu::Device, queue: &wgpu::Queue) {
             S::Full,
         ),
         (Shape::Tiled, K::Cone, Kind::Bvh, Method::Plane, S::Half),
+        (Shape::Tiled, K::Cone, Kind::ImageSpace, Method::VerifiedWalk, S::Half),
+        (Shape::Tiled, K::Cone, Kind::ImageSpace, Method::NearestWalk, S::Half),
+        (Shape::Tiled, K::Cone, Kind::ImageSpace, Method::NearestMarch, S::Half),
         (Shape::Quads, K::Constant, Kind::ImageSpace, Method::Paper, S::Quarter),
-        (Shape::Quads, K::Cone, Kind::Hybrid, Method::Plane, S::Full),
+        (Shape::Quads, K::Cone, Kind::Hybrid, Method::OrderedWalk, S::Full),
         (Shape::Tiled, K::Constant, Kind::Hybrid, Method::OrderedMarch, S::Eighth),
     ] {
         let mut settings = small();
@@ -108,7 +111,7 @@ fn make_and_record_every_pass(device: &wgpu::Device, queue: &wgpu::Queue) {
         settings.splatter_config.shape = shape;
         settings.splatter_config.kernel = kernel;
         settings.tracer_kind = kind;
-        settings.tracer.method = method;
+        settings.trace_method = method;
         for name in samples::NAMES {
             let scene = samples::by_name(name, 0.5).unwrap();
             let mut geometry = MeshGeometry::new(device, queue, &scene).unwrap();
@@ -164,16 +167,21 @@ fn walk_by_hand(
     encoder: &mut wgpu::CommandEncoder,
     (device, queue): (&wgpu::Device, &wgpu::Queue),
     settings: &Settings,
-    (env_maps, geometry, photons): (&EnvMaps, &BvhGeometry, &Photons),
+    (env_maps, hierarchy): (&EnvMaps, Option<&DepthHierarchy>),
+    (geometry, photons): (&BvhGeometry, &Photons),
 ) {
     let lost = LostRays::new(device, photons).unwrap();
     let bounces = photons.bounces();
-    let (image_space, triangles) = (ImageSpaceTracer::new(device), BvhTracer::new(device));
+    let (image_space, triangles) = (
+        ImageSpaceTracer::new(device, settings.trace_method),
+        BvhTracer::new(device),
+    );
     let mut image_space_own = ImageSpaceTracerResources::for_shared_hops(device, bounces).unwrap();
     let mut triangles_own = BvhTracerResources::for_shared_hops(device, bounces).unwrap();
     let mut inputs = ImageSpaceTracerInputs {
         queue,
         env_maps,
+        hierarchy,
         photons,
         shared: None,
         sample_offset: 0,
@@ -190,13 +198,13 @@ fn walk_by_hand(
         timestamps: None,
     };
     match settings.tracer_kind {
-        TracerKind::ImageSpace => image_space.record(encoder, &mut image_space_own, &inputs),
+        TracerKind::ImageSpace => image_space.record(encoder, &mut image_space_own, &inputs).unwrap(),
         TracerKind::Bvh => triangles.record(encoder, &mut triangles_own, &bvh_inputs),
         TracerKind::Hybrid => {
             for number in 1..=bounces {
                 inputs.shared = Some(SharedHop { number, lost: &lost });
                 bvh_inputs.shared = inputs.shared;
-                image_space.record(encoder, &mut image_space_own, &inputs);
+                image_space.record(encoder, &mut image_space_own, &inputs).unwrap();
                 triangles.record(encoder, &mut triangles_own, &bvh_inputs);
             }
         }
@@ -268,7 +276,16 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
     PhotonEmitter::new(device).record(&mut encoder, &mut emitter, &emitter_inputs);
     let mut bvh = triangles(device, queue, scene);
     bvh.prepare(queue, &frame).unwrap();
-    walk_by_hand(&mut encoder, (device, queue), settings, (&env_maps, &bvh, &photons));
+    let hierarchy = DepthHierarchy::new(device, &env_maps).unwrap();
+    let build_inputs = DepthHierarchyBuildInputs {
+        env_maps: &env_maps,
+        hierarchy: &hierarchy,
+        timestamps,
+    };
+    let mut build = DepthHierarchyBuildResources::new();
+    DepthHierarchyBuild::new(device).record(&mut encoder, &mut build, &build_inputs);
+    let maps = (&env_maps, Some(&hierarchy));
+    walk_by_hand(&mut encoder, (device, queue), settings, maps, (&bvh, &photons));
     let g_buffer_inputs = GBufferCaptureInputs {
         queue,
         geometry: &geometry,

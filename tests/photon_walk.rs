@@ -48,7 +48,7 @@ impl<'a> World<'a> {
             gpu,
             offline,
             bvh,
-            image_space_tracer: ImageSpaceTracer::new(&gpu.device),
+            image_space_tracer: ImageSpaceTracer::new(&gpu.device, settings.trace_method),
             bvh_tracer: BvhTracer::new(&gpu.device),
         }
     }
@@ -71,10 +71,18 @@ impl<'a> World<'a> {
     }
 
     fn image_space(&self, env_maps: &EnvMaps, photons: &Photons, shared: Option<SharedHop<'_>>) {
-        let mut resources = ImageSpaceTracerResources::for_shared_hops(&self.gpu.device, BOUNCES).unwrap();
+        let device = &self.gpu.device;
+        let mut resources = ImageSpaceTracerResources::for_shared_hops(device, BOUNCES).unwrap();
+        let hierarchy = DepthHierarchy::new(device, env_maps).unwrap();
+        let build_inputs = DepthHierarchyBuildInputs {
+            env_maps,
+            hierarchy: &hierarchy,
+            timestamps: None,
+        };
         let inputs = ImageSpaceTracerInputs {
             queue: &self.gpu.queue,
             env_maps,
+            hierarchy: Some(&hierarchy),
             photons,
             shared,
             sample_offset: SAMPLE_OFFSET,
@@ -82,7 +90,11 @@ impl<'a> World<'a> {
             timestamps: None,
         };
         submit(self.gpu, |encoder| {
-            self.image_space_tracer.record(encoder, &mut resources, &inputs);
+            let mut build = DepthHierarchyBuildResources::new();
+            DepthHierarchyBuild::new(device).record(encoder, &mut build, &build_inputs);
+            self.image_space_tracer
+                .record(encoder, &mut resources, &inputs)
+                .unwrap();
         });
     }
 

@@ -6,8 +6,8 @@
 //! each frame, and each full round ends with a maintenance step, until nothing changes any more.
 
 use crate::pass::{
-    CoverageMeasure, EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings, SelectBlockingInputs,
-    Selection, SelectionStep,
+    CoverageMeasure, EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings,
+    SelectBlockingInputs, Selection, SelectionStep,
 };
 use crate::resource::{CaptureView, EnvMaps, Geometry, Photons};
 use crate::scene::{SceneBounds, UnitFrame};

@@ -18,8 +18,8 @@ use crate::pass::{
 #[cfg(feature = "bvh")]
 use crate::resource::BvhGeometry;
 use crate::resource::{
-    CameraView, CapturePurpose, CaptureView, EnvMaps, GBuffer, Geometry, Irradiance, Lights, NearestOccluders, Photons,
-    PrepareContext, Radiance, ShadowMaps, Subsampling, Visibility,
+    CameraView, CapturePurpose, CaptureView, DepthHierarchy, EnvMaps, GBuffer, Geometry, Irradiance, Lights,
+    NearestOccluders, Photons, PrepareContext, Radiance, ShadowMaps, Subsampling, Visibility,
 };
 use crate::scene::{Light, SceneBounds, SceneSummary, UnitFrame};
 use crate::{Error, Timestamps};
@@ -699,8 +699,12 @@ impl GiRenderer {
         self.indirect.as_ref().and_then(IndirectScene::env_maps)
     }
 
-    /// Share, by area, of what valid candidates for environment maps see that the maps in use see; `None` until a
-    /// selection has arrived, and for maps placed by hand.
+    /// Their depth hierarchies, if rays are searched for by walking over these.
+    pub fn depth_hierarchy(&self) -> Option<&DepthHierarchy> {
+        self.indirect.as_ref().and_then(IndirectScene::depth_hierarchy)
+    }
+
+    /// Share of what valid candidates for environment maps see that the maps in use see; `None` until a selection has arrived, and for maps placed by hand.
     pub fn env_map_coverage(&self) -> Option<f32> {
         self.placement.coverage()
     }

@@ -5,8 +5,9 @@ use crate::Error;
 #[cfg(feature = "bvh")]
 use crate::pass::{BvhTracer, BvhTracerInputs, BvhTracerResources};
 use crate::pass::{
-    DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources, ImageSpaceTracer, ImageSpaceTracerInputs,
-    ImageSpaceTracerResources, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources, SharedHop,
+    DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EnvMapCapture, EnvMapCaptureInputs,
+    EnvMapCaptureResources, ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitter,
+    PhotonEmitterInputs, PhotonEmitterResources, SharedHop,
 };
 use crate::resource::{CaptureView, DepthHierarchy, EnvMaps, Lights, LostRays, Photons, ShadowMaps};
 
@@ -78,7 +79,12 @@ impl IndirectScene {
         let photons = Photons::new(device, settings.photons, settings.bounces)?;
         let image_space = || {
             let env_maps = EnvMaps::new(device, settings.env_map_count, settings.env_map_size)?;
-            let hierarchy = || Ok((DepthHierarchy::new(device, &env_maps)?, DepthHierarchyBuildResources::new()));
+            let hierarchy = || {
+                Ok((
+                    DepthHierarchy::new(device, &env_maps)?,
+                    DepthHierarchyBuildResources::new(),
+                ))
+            };
             Ok(ImageSpaceScene {
                 hierarchy: needs_hierarchy(settings).then(hierarchy).transpose()?,
                 env_maps,
@@ -107,6 +113,10 @@ impl IndirectScene {
 
     pub(super) fn env_maps(&self) -> Option<&EnvMaps> {
         self.image_space.as_ref().map(|i| &i.env_maps)
+    }
+
+    pub(super) fn depth_hierarchy(&self) -> Option<&DepthHierarchy> {
+        self.image_space.as_ref()?.hierarchy.as_ref().map(|h| &h.0)
     }
 
     pub(super) fn env_maps_mut(&mut self) -> Option<&mut EnvMaps> {

@@ -2,9 +2,9 @@
 
 use crate::Error;
 use crate::pass::{
-    Bandwidth, CoverageMeasure, EnvMapSelectorResources, EnvMapSelectorSettings, ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS,
-    MAX_SELECTED, MAX_TAPS, PenumbraSearch, PhotonSplatterConfig, PhotonSplatterSettings, SoftShadowSettings,
-    SplatShape, TraceMethod, UpsamplerSettings,
+    Bandwidth, CoverageMeasure, EnvMapSelectorResources, EnvMapSelectorSettings, ImageSpaceTracerSettings, Kernel,
+    LARGEST_RADIUS, MAX_SELECTED, MAX_TAPS, PenumbraSearch, PhotonSplatterConfig, PhotonSplatterSettings,
+    SoftShadowSettings, SplatShape, TraceMethod, UpsamplerSettings,
 };
 use crate::resource::Subsampling;
 
@@ -356,9 +356,12 @@ const KNOBS: &[Knob] = &[
     ),
     field!("tracer.iterations", "1 to 32", tracer.iterations, |v| (1..=32)
         .contains(&v)),
-    field!("tracer.most_fetches", "0 or more; 0: no limit", tracer.most_fetches, |_| {
-        true
-    }),
+    field!(
+        "tracer.most_fetches",
+        "0 or more; 0: no limit",
+        tracer.most_fetches,
+        |_| { true }
+    ),
     field!("tracer.roulette_from", "1 or more", tracer.roulette_from, |v| v >= 1),
     choice!(
         "splatter.shape",

@@ -266,7 +266,12 @@ impl ImageSpaceTracer {
             sample_offset: inputs.sample_offset,
             roulette_from: inputs.settings.roulette_from,
         };
-        let maps = self.maps_group(resources, inputs.queue, (inputs.env_maps, inputs.hierarchy), inputs.settings)?;
+        let maps = self.maps_group(
+            resources,
+            inputs.queue,
+            (inputs.env_maps, inputs.hierarchy),
+            inputs.settings,
+        )?;
         let Some(walk) = self.walk.prepare(&mut resources.walk, &walk) else {
             return Ok(());
         };
@@ -292,7 +297,12 @@ impl ImageSpaceTracer {
         resources: &mut ImageSpaceTracerResources,
         inputs: &ImageSpaceTracerRayInputs<'_>,
     ) -> Result<(), Error> {
-        let maps = self.maps_group(resources, inputs.queue, (inputs.env_maps, inputs.hierarchy), inputs.settings)?;
+        let maps = self.maps_group(
+            resources,
+            inputs.queue,
+            (inputs.env_maps, inputs.hierarchy),
+            inputs.settings,
+        )?;
         let (groups, row) = dispatch_64(inputs.rays.count());
         let params = gpu::ListParams {
             ray_count: inputs.rays.count(),

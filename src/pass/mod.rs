@@ -34,12 +34,13 @@ pub use depth_hierarchy_build::{DepthHierarchyBuild, DepthHierarchyBuildInputs, 
 pub use direct_light::{DirectLight, DirectLightInputs, DirectLightResources};
 pub use env_map_capture::{EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources};
 pub use env_map_selector::{
-    CoverageMeasure, EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings, MAX_SELECTED,
-    SelectBlockingInputs, Selection, SelectionStep, Sight,
+    CoverageMeasure, EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings,
+    MAX_SELECTED, SelectBlockingInputs, Selection, SelectionStep, Sight,
 };
 pub use g_buffer_capture::{GBufferCapture, GBufferCaptureInputs};
 pub use image_space_tracer::{
-    ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerRayInputs, ImageSpaceTracerResources, ImageSpaceTracerSettings, TraceMethod,
+    ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerRayInputs, ImageSpaceTracerResources,
+    ImageSpaceTracerSettings, TraceMethod,
 };
 pub use nearest_occluder::{NearestOccluder, NearestOccluderInputs, NearestOccluderResources};
 pub use photon_emitter::{PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources};

@@ -4,10 +4,15 @@
 // On a face of the cube the ray is a straight line, and depth is the distance z along the face's axis. A texel is a piece
 // of plane, and with h(t) = n . p(t) / n . s (p a point of the ray, s the stored point, n the normal; all relative to the
 // map's centre) the ray is in front of the plane where h < 1, and h is linear in t. A range of inverse depth [least,
-// greatest] keeps h between least z and greatest z, where a plane seen at a grazing angle would reach anywhere.
+// greatest] keeps h between least z and greatest z, where a plane seen at a grazing angle would reach anywhere. Behind the
+// surface, h is how many times as deep as the surface the ray is.
 
 // A crossing may fall between two texels whose planes do not quite meet: by up to so many texels it still counts.
 const HIERARCHY_CRACK: f32 = 0.25;
+// Bodies are taken to reach so far behind what a map shows of them, as a factor of depth: a ray that comes out from behind
+// a rim nearer to it than that has gone through the body. Less lets light through closed doors, more blocks what passes
+// behind thin things (`docs/tracing.md`).
+const HIERARCHY_THICKNESS: f32 = 1.08;
 // A ray starts on a surface, so that it begins with small squares.
 const HIERARCHY_FIRST_LEVEL: u32 = 2u;
 // Less depth than this there is not: a ray past the map's centre goes from one face to the opposite one.
@@ -121,6 +126,8 @@ fn hierarchy_map(map: u32, x: vec3f, r: vec3f, start: f32, end: f32, starts_in_f
     // Of the texel walked through last, h = x + t y; nothing crosses this one
     var last_plane = vec2f(0.0);
     var last_surface: SurfaceTexel;
+    // While the ray is behind: h where it left the last texel
+    var behind = HIERARCHY_THICKNESS;
     let first = x + start * r;
     var face = cube_face_point(select(first, r, dot(first, first) < 1e-12)).face;
     let top = u32(firstLeadingBit(params.map_size - 1u)) + 1u;
@@ -144,11 +151,13 @@ fn hierarchy_map(map: u32, x: vec3f, r: vec3f, start: f32, end: f32, starts_in_f
             let range = depth_range_unpack(bits);
             let z = vec2f(ray.x.z + t * ray.r.z, ray.x.z + out * ray.r.z);
             let all_in_front = range.greatest * max(z.x, z.y) < 1.0;
-            let all_behind = range.least * min(z.x, z.y) > 1.0;
             if all_in_front {
+                if !in_front && behind < HIERARCHY_THICKNESS {
+                    return hierarchy_blocked(result, last_surface, x, r, t);
+                }
                 in_front = true;
                 last_plane = vec2f(0.0);
-            } else if !(all_behind && !in_front) {
+            } else if in_front || range.least * min(z.x, z.y) < HIERARCHY_THICKNESS {
                 if level > 0u {
                     level--;
                     cell = clamp(hierarchy_cell(ray, t) >> vec2u(level), 2 * cell, 2 * cell + 1);
@@ -181,6 +190,9 @@ fn hierarchy_map(map: u32, x: vec3f, r: vec3f, start: f32, end: f32, starts_in_f
                         is_certain = false;
                     }
                 } else if height.x >= 0.0 {
+                    if !in_front && behind < HIERARCHY_THICKNESS {
+                        return hierarchy_blocked(result, last_surface, x, r, t);
+                    }
                     in_front = true;
                 }
                 if in_front && height.x >= 0.0 && height.y < 0.0 {
@@ -189,9 +201,16 @@ fn hierarchy_map(map: u32, x: vec3f, r: vec3f, start: f32, end: f32, starts_in_f
                     result.hit = hierarchy_hit(surface, x, r, select(between, meets, is_on_plane));
                     return hierarchy_crossing(result, is_certain, ray, cell, bits, start);
                 }
-                in_front = in_front || height.y >= 0.0;
+                if !in_front && height.y >= 0.0 {
+                    // Through the plane from behind: whatever the ray met, it did not come out here.
+                    return hierarchy_blocked(result, surface, x, r, clamp(meets, t, out));
+                }
+                behind = 1.0 - height.y;
                 last_plane = plane;
                 last_surface = surface;
+            }
+            if !in_front && range.least * min(z.x, z.y) >= HIERARCHY_THICKNESS {
+                behind = HIERARCHY_THICKNESS;
             }
             if in_front && is_certain {
                 result.free = out;
@@ -229,4 +248,14 @@ fn hierarchy_map(map: u32, x: vec3f, r: vec3f, start: f32, end: f32, starts_in_f
 
 fn hierarchy_hit(surface: SurfaceTexel, x: vec3f, r: vec3f, t: f32) -> Hit {
     return Hit(HIT_SURFACE, t, x + t * r, surface.normal, surface.reflectance);
+}
+
+// The ray comes out through a surface from behind, or close behind its rim: through whatever body that surface belongs to.
+// What it met was the body's other side, which no map need show, at about this place.
+fn hierarchy_blocked(found: MapTrace, surface: SurfaceTexel, x: vec3f, r: vec3f, t: f32) -> MapTrace {
+    var result = found;
+    result.hit = hierarchy_hit(surface, x, r, t);
+    result.hit.kind = HIT_TENTATIVE;
+    result.hit.normal = select(surface.normal, -surface.normal, dot(surface.normal, r) > 0.0);
+    return result;
 }

@@ -37,6 +37,15 @@ fn ordered_knows(map: u32, x: vec3f, normal: vec3f, r: vec3f, free: f32) -> bool
     return trace_sees(map, x, normal);
 }
 
+// Whether a crossing that is not certain is to be preferred: one seen from the front to one inferred from behind, then the
+// nearer.
+fn ordered_is_better(hit: Hit, than: Hit) -> bool {
+    if hit.kind == HIT_LOST || than.kind == HIT_LOST || hit.kind == than.kind {
+        return hit.kind != HIT_LOST && (than.kind == HIT_LOST || hit.distance < than.distance);
+    }
+    return hit.kind == HIT_SURFACE;
+}
+
 struct Verdict {
     // HIT_SURFACE: `hit` stands, as the nearest map shows it. HIT_ESCAPED: there is nothing, up to `free`.
     kind: u32,
@@ -75,15 +84,17 @@ fn ordered_verify(origin: vec3f, r: vec3f, crossing: Hit, map: u32) -> Verdict {
     return verdict;
 }
 
-// The ray through the maps in order. Maps that do not know where it stands are passed over, for what they see may lie
-// behind walls; only a ray whose origin no map knows is looked for everywhere.
+// The ray through the maps in order. A map that does not know where the ray stands may see what lies behind walls. The walk
+// notices when a ray comes out of a wall. The march does not: it passes over such maps, and only a ray whose origin no map
+// knows is looked for everywhere.
 fn ordered_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
+    let only_knowing = method == METHOD_ORDERED_MARCH;
     var free = 0.0;
     var tentative = hit_nothing(HIT_LOST);
     // Of the map that showed it
     var tentative_reach = 0.0;
     var is_known = false;
-    for (var round = 0u; round < 2u && !is_known; round++) {
+    for (var round = 0u; round < 2u && !is_known && (only_knowing || round == 0u); round++) {
         var ordered = vec2f(-1.0, -1.0);
         for (var i = 0u; i < params.map_count; i++) {
             ordered = ordered_next_map(origin, ordered);
@@ -94,7 +105,7 @@ fn ordered_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
             let center = centers[map].xyz;
             let x = origin - center;
             let knows = ordered_knows(map, x, normal, r, free);
-            if !knows && round == 0u {
+            if !knows && only_knowing && round == 0u {
                 continue;
             }
             is_known = is_known || knows;
@@ -116,10 +127,10 @@ fn ordered_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
                 found.hit = hit_nothing(HIT_LOST);
             }
             let may_deny = distance(tentative.position, center) <= ORDERED_DENIAL * tentative_reach;
-            if tentative.kind == HIT_SURFACE && tentative.distance < free && may_deny {
+            if tentative.kind != HIT_LOST && tentative.distance < free && may_deny {
                 tentative = hit_nothing(HIT_LOST);
             }
-            if found.hit.kind == HIT_SURFACE && (tentative.kind != HIT_SURFACE || found.hit.distance < tentative.distance) {
+            if ordered_is_better(found.hit, tentative) {
                 tentative = found.hit;
                 tentative_reach = distance(found.hit.position, center);
             }
