@@ -238,9 +238,9 @@ fn twins() -> Vec<Twin> {
             map_count, map_size, iterations, epsilon, most_fetches,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "ListParams", image_space_tracer::gpu::ListParams { ray_count, row }),
-        twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "SurfaceRay", SurfaceRay { position, normal, direction, _pad }),
+        twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "SurfaceRay", SurfaceRay { position, normal, direction, pad }),
         twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "SurfaceHit", SurfaceHit {
-            distance, kind, normal, reflectance, fetches, maps, steps, _pad,
+            distance, kind, normal, reflectance, fetches, maps, steps, pad,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "WalkParams", photon_walk::gpu::WalkParams {
             photon_count, first_hop, last_hop, roulette_from, sample_offset, row,
@@ -508,6 +508,15 @@ fn kind_of_variable(space: AddressSpace, ty: &TypeInner) -> String {
                 },
             ) => {
                 format!("texture_storage_2d<{format:?}, write>")
+            }
+            (
+                true,
+                ImageClass::Storage {
+                    format,
+                    access: StorageAccess::STORE,
+                },
+            ) => {
+                format!("texture_storage_2d_array<{format:?}, write>")
             }
             other => format!("{other:?}"),
         },

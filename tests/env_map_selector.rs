@@ -8,8 +8,8 @@ use common::{Gpu, assert_no_errors, gpu};
 use lightfall::frame::{GiRenderer, SceneInputs, Settings, ViewInputs, ViewResources};
 use lightfall::glam::{DAffine3, DVec3, Vec3};
 use lightfall::pass::{
-    CompositeSettings, EnvMapSelector, EnvMapSelectorResources, EnvMapSelectorSettings, SelectBlockingInputs,
-    Selection, Sight,
+    CompositeSettings, CoverageMeasure, EnvMapSelector, EnvMapSelectorResources, EnvMapSelectorSettings,
+    SelectBlockingInputs, Selection, Sight,
 };
 use lightfall::resource::cube_face::CUBE_FACES;
 use lightfall::resource::{CameraView, MeshGeometry};
@@ -453,11 +453,19 @@ struct Host<'a> {
 
 impl<'a> Host<'a> {
     fn new(gpu: &'a Gpu, scene: Scene) -> Self {
+        Self::by(gpu, scene, CoverageMeasure::Area, 8)
+    }
+
+    fn by(gpu: &'a Gpu, scene: Scene, measure: CoverageMeasure, env_map_count: u32) -> Self {
         let settings = Settings {
             photons: 3000,
-            env_map_count: 8,
+            env_map_count,
             env_map_size: 32,
             shadow_map_size: 64,
+            selector: EnvMapSelectorSettings {
+                measure,
+                ..Default::default()
+            },
             ..Settings::balanced()
         };
         let renderer = GiRenderer::new(&gpu.device, &settings).unwrap();
@@ -706,6 +714,85 @@ fn a_frame_that_is_never_submitted_loses_no_selection() {
     drop(host.record());
     host.settle();
     assert_eq!(host.selected(), host.selected_anew());
+    // Nor does it go by photons that were never traced.
+    let mut host = Host::by(&gpu, samples::pillars(0.0), CoverageMeasure::Photons, 8);
+    drop(host.record());
+    host.settle();
+    assert!(
+        host.selected().0 > 2 && host.selected().1 > 0.99,
+        "{:?}",
+        host.selected()
+    );
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn by_photons_a_selection_arrives_without_a_wait_too_and_comes_to_rest() {
+    let Some(gpu) = gpu() else { return };
+    for (scene, maps) in [
+        (room_with_slabs().0, 1..2),
+        (samples::cornell(0.0), 2..9),
+        (samples::pillars(0.0), 4..9),
+    ] {
+        let mut host = Host::by(&gpu, scene, CoverageMeasure::Photons, 8);
+        host.frame();
+        let before = creation_count();
+        let frames = host.settle();
+        assert_eq!(creation_count().waits, before.waits, "the crate waited for the GPU");
+        println!(
+            "{:?} after {frames} frames, at once {:?}",
+            host.selected(),
+            host.selected_anew()
+        );
+        assert!(maps.contains(&host.selected().0));
+        assert!(host.selected().1 > host.selected_anew().1 - 0.01);
+        host.frame();
+        let image = host.image();
+        host.frame();
+        assert!(image.iter().flatten().any(|&v| v > 0.0));
+        assert!(host.image() == image);
+    }
+    assert_no_errors(&gpu);
+}
+
+/// A house, the lamp in its only room, on wide ground.
+fn house() -> Scene {
+    let mut scene = room(DVec3::ONE);
+    let mut outside = scene.meshes[0].clone();
+    for triangle in outside.indices.chunks_exact_mut(3) {
+        triangle.swap(0, 1);
+    }
+    let mut ground = Mesh::default();
+    ground.positions = vec![
+        [-3.0, -1.1, 3.0],
+        [3.0, -1.1, 3.0],
+        [3.0, -1.1, -3.0],
+        [-3.0, -1.1, -3.0],
+    ];
+    ground.indices = vec![0, 1, 2, 0, 2, 3];
+    scene.meshes.extend([outside, ground]);
+    let mut shell = Instance::new(1, 0);
+    shell.transform = DAffine3::from_scale(DVec3::splat(1.05));
+    scene.instances.extend([shell, Instance::new(2, 0)]);
+    scene.cameras = samples::furnace(0.5, 1.0).cameras;
+    scene
+}
+
+#[test]
+fn by_photons_maps_stand_where_the_light_is() {
+    let Some(gpu) = gpu() else { return };
+    let stands_inside = |measure| {
+        let mut host = Host::by(&gpu, house(), measure, 1);
+        host.frame();
+        host.settle();
+        println!("{measure:?}: {:.2?}", host.centers());
+        host.centers()[0].abs().max_element() < 1.0
+    };
+    assert!(
+        !stands_inside(CoverageMeasure::Area),
+        "the outside has by far the larger area"
+    );
+    assert!(stands_inside(CoverageMeasure::Photons));
     assert_no_errors(&gpu);
 }
 

@@ -233,6 +233,10 @@ fn what_image_space_loses_continues_with_what_the_triangles_say() {
             let again = read(&gpu, &again);
             for path in unresolved(&alone, paths, hop) {
                 let slot = hop as usize * paths + path as usize;
+                // Where an earlier hop was unresolved the two came to different places.
+                if (1..hop as usize).any(|h| alone[h * paths + path as usize].is_unresolved()) {
+                    continue;
+                }
                 assert_eq!(both[slot], again[slot], "path {path}, hop {hop}");
                 assert!(!both[slot].is_unresolved());
                 compared += 1;

@@ -19,6 +19,13 @@ use std::ops::Range;
 /// border must not restart the selection every frame.
 const REGION_SLACK: f64 = 0.1;
 
+/// How often places are selected by photons before they are maintained: first by photons that saw maps in places chosen by
+/// area, then by better ones. A third time changed no selection (`docs/tracing.md`).
+pub(super) const PHOTON_ROUNDS: u32 = 2;
+
+/// Frames in which photons may arrive nowhere before places are left as they are.
+const MOST_FAILURES: u32 = 4;
+
 /// Rounds of maintenance after the last change if the selection does not come to rest; two to five suffice (Yao et al.
 /// 2010, section 4.1).
 const MOST_ROUNDS: u32 = 8;
@@ -46,8 +53,13 @@ struct OngoingSelection {
     last_region: SceneBounds,
     /// Whether the next frame selects anew.
     is_pending: bool,
-    /// Whether the first frame that has photons does.
-    awaits_photons: bool,
+    /// Selections still to be made by photons.
+    photon_rounds: u32,
+    /// Frames until the next of them, so that its photons were traced through the maps of the one before; `None`: that has
+    /// not arrived yet.
+    photons_in: Option<u32>,
+    /// Selections by photons that found none so far.
+    failures: u32,
     /// Whether there is anything to maintain.
     is_started: bool,
     /// Rounds of maintenance still to go; 0: at rest.
@@ -179,13 +191,15 @@ impl EnvMapPlacement {
     /// What this frame does for the selection, if anything, and whether there are photons for it to go by; adds the views
     /// that it draws.
     pub(super) fn plan_frame(
-        &self,
+        &mut self,
         settings: &EnvMapSelectorSettings,
         has_photons: bool,
         views: &mut Vec<CaptureView>,
     ) -> Option<Work> {
-        let ongoing = self.ongoing.as_ref()?;
-        let work = ongoing.next_work(settings.interval, has_photons)?;
+        let ongoing = self.ongoing.as_mut()?;
+        let work = ongoing.next_work(settings.interval, has_photons);
+        ongoing.photons_in = ongoing.photons_in.map(|frames| frames.saturating_sub(1));
+        let work = work?;
         views.extend(ongoing.resources.views(work.candidates.clone()));
         Some(work)
     }
@@ -277,7 +291,9 @@ impl OngoingSelection {
             frame: *context.frame,
             last_region: *context.region,
             is_pending: true,
-            awaits_photons: false,
+            photon_rounds: 0,
+            photons_in: None,
+            failures: 0,
             is_started: false,
             rounds: 0,
             part: 0,
@@ -301,11 +317,12 @@ impl OngoingSelection {
     fn spread_candidates(&mut self, context: &SelectionContext<'_>) -> Result<(), Error> {
         self.resources.set_candidates(context.queue, &context.candidates())?;
         (self.region, self.frame) = (*context.region, *context.frame);
-        (self.is_pending, self.is_started) = (true, false);
+        (self.is_pending, self.is_started, self.failures) = (true, false, 0);
         Ok(())
     }
 
     fn geometry_changed(&mut self) {
+        self.failures = 0;
         if !self.is_started {
             self.is_pending = true;
         } else if self.part == 0 {
@@ -318,7 +335,7 @@ impl OngoingSelection {
 
     fn next_work(&self, interval: u32, has_photons: bool) -> Option<Work> {
         let count = self.resources.candidates().len();
-        if self.is_pending || (self.awaits_photons && has_photons) {
+        if self.is_pending || (has_photons && self.photon_rounds > 0 && self.photons_in == Some(0)) {
             return Some(Work {
                 candidates: 0..count,
                 step: SelectionStep::Select,
@@ -348,7 +365,11 @@ impl OngoingSelection {
             }
             SelectionStep::Select => {
                 (self.is_pending, self.is_started) = (false, true);
-                self.awaits_photons = lacked_photons;
+                if lacked_photons {
+                    (self.photon_rounds, self.photons_in) = (PHOTON_ROUNDS, Some(0));
+                } else {
+                    (self.photon_rounds, self.photons_in) = (self.photon_rounds.saturating_sub(1), None);
+                }
                 (self.rounds, self.settles_from) = (MOST_ROUNDS, self.tag);
             }
             SelectionStep::Maintain => self.rounds = self.rounds.saturating_sub(1),
@@ -359,6 +380,13 @@ impl OngoingSelection {
 
     /// Comes to rest once a step has found nothing to change in the geometry as it is now.
     fn settle(&mut self, selection: &Selection) {
+        if selection.centers.is_empty() && self.failures < MOST_FAILURES {
+            // No photon arrived anywhere, as when the frame that traced them was never submitted.
+            self.failures += 1;
+            (self.photon_rounds, self.photons_in) = (self.photon_rounds + 1, Some(0));
+            return;
+        }
+        self.photons_in = self.photons_in.or(Some(1));
         if selection.is_stable && selection.tag >= self.settles_from {
             (self.rounds, self.part) = (0, 0);
         }

@@ -5,7 +5,7 @@
 //! for, submitted or, once settled, allocated on the way. One small result comes back by itself: where environment maps
 //! should stand.
 
-use super::env_map_placement::{EnvMapPlacement, PlacementInputs, SelectionContext, Work};
+use super::env_map_placement::{EnvMapPlacement, PHOTON_ROUNDS, PlacementInputs, SelectionContext, Work};
 use super::indirect_scene::{IndirectScene, PhotonInputs, PhotonPasses};
 use super::{Plan, Settings, Stage};
 use crate::pass::{
@@ -299,14 +299,12 @@ impl GiRenderer {
     /// # Errors
     /// [`Error::ReadBack`], [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
     pub fn place_env_maps_blocking(&mut self, queue: &wgpu::Queue, geometry: &mut dyn Geometry) -> Result<(), Error> {
-        /// How often photons are traced; a third time changed no selection (`docs/tracing.md`).
-        const ROUNDS: u32 = 2;
         if !self.settings.tracer_kind.uses_env_maps() {
             return Ok(());
         }
         self.select_blocking(queue, geometry, false)?;
         if self.settings.selector.measure == CoverageMeasure::Photons && self.indirect.is_some() {
-            for _ in 0..ROUNDS {
+            for _ in 0..PHOTON_ROUNDS {
                 self.trace_for_selection(queue, geometry)?;
                 self.select_blocking(queue, geometry, true)?;
             }

@@ -115,6 +115,9 @@ const MOST_SWAPS: u32 = 8;
 /// may be curved; a larger share would look through thin walls.
 const TOLERANCE: f32 = 0.004;
 
+/// The same for samples: a photon's place is itself off by as much as a shadow map's texel.
+const SAMPLE_TOLERANCE: f32 = 0.008;
+
 /// Candidates keep this share of the region's extent away from its border.
 const MARGIN: f64 = 0.03;
 
@@ -159,7 +162,7 @@ impl Default for EnvMapSelectorSettings {
             back_face_limit: 0.2,
             clearance: 0.03,
             measure: CoverageMeasure::default(),
-            coverage_target: 0.9999,
+            coverage_target: 0.999,
             interval: 5,
         }
     }
@@ -440,7 +443,11 @@ impl EnvMapSelector {
             tag: inputs.tag,
             back_face_limit: inputs.settings.back_face_limit,
             clearance: inputs.settings.clearance * inputs.radius,
-            tolerance: TOLERANCE * inputs.radius,
+            tolerance: inputs.radius
+                * match inputs.photons {
+                    Some(_) => SAMPLE_TOLERANCE,
+                    None => TOLERANCE,
+                },
             coverage_target: inputs.settings.coverage_target,
             sample_count: inputs.photons.map_or(0, |_| SAMPLES),
         };
@@ -512,7 +519,8 @@ impl EnvMapSelector {
         }
         run(&steps.end_steps, 1);
         run(&steps.sum_unseen, count);
-        if !is_anew {
+        // By area it would cost as much as all swaps, and maintenance follows.
+        for _ in 0..if by_samples { MOST_SWAPS } else { u32::from(!is_anew) } {
             run(&steps.try_without, 1);
             run(&steps.sum_unseen, count);
             run(&steps.keep_if_needed, 1);

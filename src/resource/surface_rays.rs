@@ -15,7 +15,7 @@ pub struct SurfaceRay {
     /// Unit.
     pub direction: [f32; 3],
     /// 0.
-    pub _pad: u32,
+    pub pad: u32,
 }
 
 impl SurfaceRay {
@@ -25,7 +25,7 @@ impl SurfaceRay {
             position: position.to_array(),
             normal: Photon::pack_unit_vector(normal),
             direction: direction.to_array(),
-            _pad: 0,
+            pad: 0,
         }
     }
 }
@@ -62,7 +62,7 @@ pub struct SurfaceHit {
     /// Steps of the innermost loops.
     pub steps: u32,
     /// 0.
-    pub _pad: u32,
+    pub pad: u32,
 }
 
 impl SurfaceHit {

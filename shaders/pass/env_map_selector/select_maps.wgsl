@@ -301,7 +301,7 @@ fn add_map(@builtin(local_invocation_index) lane: u32) {
         return;
     }
     let count = countOneBits(selection.selected);
-    let sees_nothing = addition != NONE && count == 0u && sights[addition].unseen <= 0.0;
+    let sees_nothing = params.sample_count > 0u && count == 0u && addition != NONE && sights[addition].unseen <= 0.0;
     if count >= params.limit || addition == NONE || sees_nothing || (count > 0u && is_satisfied(covered)) {
         selection.is_done = 1u;
     } else {

@@ -109,7 +109,9 @@ fn ordered_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
                 continue;
             }
             is_known = is_known || knows;
-            var found = trace_map(map, x, r, free, TRACE_FURTHEST, knows);
+            // A map that cannot be certain is of use only where it shows something nearer.
+            let end = select(TRACE_FURTHEST, tentative.distance, !knows && tentative.kind == HIT_SURFACE);
+            var found = trace_map(map, x, r, free, end, knows);
             found.hit.position += center;
             if found.kind == HIT_ESCAPED {
                 return hit_nothing(HIT_ESCAPED);
