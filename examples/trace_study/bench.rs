@@ -1,7 +1,6 @@
 //! A scene on the GPU: its rays, what they truly meet, environment maps of it, and the tracers.
 
 use super::common::adapter::Gpu;
-use super::common::clock::Clock;
 use super::judge::Truth;
 use lightfall::frame::{GiRenderer, SceneInputs, Settings, TracerKind};
 use lightfall::glam::{DVec3, Vec3};
@@ -131,7 +130,6 @@ impl<'a> Bench<'a> {
         let truth = |(ray, hit): (&Ray, &RayHit)| {
             hit.is_hit().then(|| Truth {
                 distance: hit.distance,
-                instance: hit.instance,
                 normal: self.normal(hit, ray.direction.into()),
             })
         };
@@ -288,11 +286,6 @@ impl<'a> Bench<'a> {
         let mut hits: Vec<SurfaceHit> = lightfall::read_buffer_blocking(device, queue, list.hits())?;
         hits.truncate(rays.len());
         Ok((hits, ms))
-    }
-
-    /// How times are taken.
-    pub(crate) fn clock(&self) -> &'static str {
-        Clock::new(self.gpu).kind()
     }
 }
 

@@ -9,7 +9,6 @@ pub(crate) struct Truth {
     pub(crate) distance: f32,
     /// Geometric, on the side hit.
     pub(crate) normal: Vec3,
-    pub(crate) instance: u32,
 }
 
 /// A position counts as right within this share of the scene's diagonal.

@@ -1,13 +1,29 @@
-//! How well rays are traced through environment maps.
+//! How well rays are traced through environment maps: what they hit against what triangles say, by method, number and size
+//! of maps; where the maps stand; how much light is lost or misplaced; how evenly the work is spread; and what it costs.
 //!
 //! ```text
 //! cargo run --release --example trace_study -- sample:cornell sample:living-room sample:colonnade
 //! ```
+//!
+//! Rays are those of diffuse light: they leave, cosine-distributed, from where photons arrive that have bounced once to
+//! three times. A ray is
+//!
+//! - correct, if its hit lies within 1 % of the scene's diagonal of the true one and the normal within 10°;
+//! - false, if it hits something else (in brackets: at the right place, with another normal);
+//! - lost, if it meets something and no hit is found;
+//! - a ghost, if it meets nothing and hits something (share of the rays that meet nothing).
+//!
+//! "Again" are the rays, of all, that a hybrid traces against triangles because they are lost or tentative; the arrow leads
+//! to the share of all rays that are right then. Errors are those of the distance of correct hits, as a share of the
+//! diagonal. Maps stand where the selector puts them, by photons traced against triangles, so that all methods see the same
+//! maps and no method chooses its own. All of it comes from one run on one adapter.
 
 #[path = "../common/mod.rs"]
 mod common;
 
 mod bench;
+mod divergence;
+mod energy;
 mod judge;
 mod selection;
 
@@ -15,10 +31,11 @@ use bench::{Bench, Maps};
 use clap::Parser;
 use common::adapter::{Gpu, Wishes};
 use common::{arguments, named_scene};
-use judge::{judge, percentile};
+use judge::{Verdict, judge, percentile};
+use lightfall::Error;
 use lightfall::glam::Vec3;
 use lightfall::pass::{CoverageMeasure, ImageSpaceTracer, ImageSpaceTracerSettings, TraceMethod};
-use lightfall::resource::SurfaceHit;
+use lightfall::resource::{SurfaceHit, SurfaceRay};
 use selection::Selector;
 
 /// Prints how well rays are traced through environment maps.
@@ -27,37 +44,24 @@ struct Arguments {
     /// .glb or .gltf files, or sample:NAME
     #[arg(required = true)]
     scenes: Vec<String>,
+    /// Which tables to print
+    #[arg(long, value_delimiter = ',', default_values = ["methods", "selection", "energy", "divergence", "times"])]
+    parts: Vec<String>,
     /// How many rays
-    #[arg(long, default_value_t = 100_000)]
-    rays: usize,
+    #[arg(long, default_value_t = 50_000, value_parser = clap::value_parser!(u32).range(100..=1_000_000))]
+    rays: u32,
     /// How many maps
-    #[arg(long, value_delimiter = ',', default_values_t = [4, 8, 12])]
+    #[arg(long, value_delimiter = ',', default_values_t = [4, 8, 12], value_parser = clap::value_parser!(u32).range(1..=31))]
     maps: Vec<u32>,
     /// Texels along a face
-    #[arg(long, value_delimiter = ',', default_values_t = [128, 256, 512])]
+    #[arg(long, value_delimiter = ',', default_values_t = [128, 256, 512], value_parser = clap::value_parser!(u32).range(4..=2048))]
     sizes: Vec<u32>,
     /// Candidates that the places of maps are chosen from
-    #[arg(long, default_value_t = 100)]
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=512))]
     candidates: u32,
-    #[arg(long, value_delimiter = ',')]
-    methods: Vec<String>,
-    #[arg(long)]
-    area: bool,
-    #[arg(long)]
-    selection: bool,
     /// Part of the adapter's name or backend
     #[arg(long)]
     adapter: Option<String>,
-}
-
-impl Arguments {
-    fn measure(&self) -> CoverageMeasure {
-        if self.area {
-            CoverageMeasure::Area
-        } else {
-            CoverageMeasure::Photons
-        }
-    }
 }
 
 fn main() {
@@ -69,160 +73,96 @@ fn main() {
 }
 
 fn run(arguments: &Arguments) -> Result<(), String> {
-    let gpu = Gpu::open(arguments.adapter.as_deref(), Wishes::default())?;
+    let wishes = Wishes {
+        large_buffers: true,
+        ..Wishes::default()
+    };
+    let gpu = Gpu::open(arguments.adapter.as_deref(), wishes)?;
     println!("{}", gpu.describe());
     for name in &arguments.scenes {
-        let scene = named_scene::load(name, 0.0)?;
-        let mut bench = Bench::new(&gpu, scene).map_err(|e| e.to_string())?;
+        let mut bench = Bench::new(&gpu, named_scene::load(name, 0.0)?).map_err(|e| e.to_string())?;
         study(&mut bench, name, arguments).map_err(|e| e.to_string())?;
     }
     gpu.check()
 }
 
-fn study(bench: &mut Bench<'_>, name: &str, arguments: &Arguments) -> Result<(), lightfall::Error> {
-    let rays = bench.rays(arguments.rays)?;
+fn study(bench: &mut Bench<'_>, name: &str, arguments: &Arguments) -> Result<(), Error> {
+    let rays = bench.rays(arguments.rays as usize)?;
     let truths = bench.truths(&rays)?;
-    println!("\n{name}: {} rays\n", rays.len());
     println!(
-        "| method | k | size | correct | false (normal) | lost | ghost | again → hybrid | error 50, 95 % | fetches mean, 50, 95, 99 % | µs a ray |"
+        "\n## {name}\n\n{} rays, {} candidates.",
+        rays.len(),
+        arguments.candidates
+    );
+    let mut selector = Selector::new(bench, arguments.candidates)?;
+    for part in &arguments.parts {
+        match part.as_str() {
+            "methods" => methods(bench, &mut selector, (&rays, &truths), arguments)?,
+            "selection" => {
+                let end = |(ray, truth): (&SurfaceRay, &Option<judge::Truth>)| {
+                    let truth = truth.as_ref()?;
+                    let position = Vec3::from(ray.position) + truth.distance * Vec3::from(ray.direction);
+                    Some((position, truth.normal))
+                };
+                let ends: Vec<_> = rays.iter().zip(&truths).filter_map(end).collect();
+                selection::table(bench, &mut selector, &ends)?;
+            }
+            "energy" => energy::table(bench, &mut selector)?,
+            "divergence" => divergence::table(bench, &mut selector, (&rays, &truths))?,
+            "times" => selection::times(bench, &mut selector, &rays)?,
+            _ => {
+                return Err(Error::UnknownSetting {
+                    key: part.clone(),
+                    known: "methods, selection, energy, divergence, times".into(),
+                });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Every method with every number and size of maps.
+fn methods(
+    bench: &mut Bench<'_>,
+    selector: &mut Selector,
+    (rays, truths): (&[SurfaceRay], &[Option<judge::Truth>]),
+    arguments: &Arguments,
+) -> Result<(), Error> {
+    println!(
+        "\n| method | maps | size | correct | false (normal) | lost | ghost | again → hybrid | error, 50, 95 % | fetches: \
+         mean, 50, 95, 99 % | µs a ray |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
-    let mut selector = Selector::new(bench, arguments.candidates)?;
-    if arguments.selection {
-        let ends: Vec<_> = rays
-            .iter()
-            .zip(&truths)
-            .filter_map(|(r, t)| {
-                t.as_ref()
-                    .map(|t| (Vec3::from(r.position) + t.distance * Vec3::from(r.direction), t.normal))
-            })
-            .collect();
-        selection::table(bench, &mut selector, &ends, arguments.maps[0])?;
-        return Ok(());
-    }
-    for &k in &arguments.maps {
-        let centers = selector.select(bench, k, arguments.measure())?.centers;
+    let variants = TraceMethod::ALL.into_iter().flat_map(|method| {
+        let iterations: &[u32] = match method {
+            TraceMethod::Paper => &[3, 5, 8],
+            _ => &[8],
+        };
+        iterations.iter().map(move |&iterations| (method, iterations))
+    });
+    let tracers: Vec<_> = variants
+        .map(|(method, iterations)| (ImageSpaceTracer::new(&bench.gpu.device, method), iterations))
+        .collect();
+    for &count in &arguments.maps {
+        let centers = selector.select(bench, count, CoverageMeasure::Photons)?.centers;
         for &size in &arguments.sizes {
             let maps = bench.capture(&centers, size)?;
-            for method in TraceMethod::ALL
-                .into_iter()
-                .filter(|m| arguments.methods.is_empty() || arguments.methods.contains(&format!("{m:?}")))
-            {
-                let tracer = ImageSpaceTracer::new(&bench.gpu.device, method);
-                let (hits, ms) = bench.trace(&tracer, &ImageSpaceTracerSettings::default(), &maps, &rays)?;
-                let v = judge(&truths, &hits, bench.diagonal);
-                let percent = |x: f64| format!("{:.2}", 100.0 * x);
+            for (tracer, iterations) in &tracers {
+                let settings = ImageSpaceTracerSettings {
+                    iterations: *iterations,
+                    ..Default::default()
+                };
+                let (hits, ms) = bench.trace(tracer, &settings, &maps, rays)?;
+                let name = match tracer.method() {
+                    TraceMethod::Paper => format!("paper, {iterations} iterations"),
+                    method => format!("{method:?}"),
+                };
+                let verdict = judge(truths, &hits, bench.diagonal);
                 println!(
-                    "| {method:?} | {k} | {size} | {} | {} ({}) | {} | {} | {} → {} | {}, {} | {} | {:.2} |",
-                    percent(v.correct),
-                    percent(v.wrong),
-                    percent(v.wrong_normal),
-                    percent(v.lost),
-                    percent(v.ghost),
-                    percent(v.again),
-                    percent(v.hybrid),
-                    percent(v.error[0]),
-                    percent(v.error[1]),
+                    "| {name} | {count} | {size} | {} | {} | {:.2} |",
+                    shares(&verdict),
                     fetches(&hits),
-                    ms * 1e3 / rays.len() as f64,
-                );
-            }
-            let _: &Maps = &maps;
-            let tracer = ImageSpaceTracer::new(&bench.gpu.device, TraceMethod::OrderedWalk);
-            let (hits, _) = bench.trace(&tracer, &ImageSpaceTracerSettings::default(), &maps, &rays)?;
-            let origins: Vec<_> = rays
-                .iter()
-                .map(|r| (Vec3::from(r.position), judge::unpack(r.normal)))
-                .collect();
-            let ends: Vec<_> = rays
-                .iter()
-                .zip(&truths)
-                .map(|(r, t)| match t {
-                    Some(t) => (Vec3::from(r.position) + t.distance * Vec3::from(r.direction), t.normal),
-                    None => (Vec3::splat(9.0), Vec3::X),
-                })
-                .collect();
-            let a = bench.seen_from(&origins, &centers)?;
-            let b = bench.seen_from(&ends, &centers)?;
-            {
-                let mut table = std::collections::HashMap::new();
-                for i in 0..rays.len() {
-                    let Some(t) = truths[i] else { continue };
-                    if a[i] & b[i] == 0 {
-                        continue;
-                    }
-                    let name = bench.scene.meshes[bench.scene.instances[t.instance as usize].mesh]
-                        .name
-                        .clone();
-                    let e = table.entry(name).or_insert([0usize; 6]);
-                    e[0] += 1;
-                    let kind = hits[i].kind();
-                    use lightfall::resource::SurfaceHitKind as K;
-                    let hit = matches!(kind, K::Surface | K::Tentative);
-                    let [near, same] =
-                        judge::agrees(&t, hits[i].distance, judge::unpack(hits[i].normal), bench.diagonal);
-                    if hit && same {
-                        e[1] += 1
-                    } else if hit && near {
-                        e[2] += 1
-                    } else if hit && hits[i].distance < t.distance {
-                        e[3] += 1
-                    } else if hit {
-                        e[4] += 1
-                    } else {
-                        e[5] += 1
-                    }
-                }
-                let mut rows: Vec<_> = table.into_iter().collect();
-                rows.sort_by_key(|r| std::cmp::Reverse(r.1[0] - r.1[1]));
-                for (n, e) in rows.iter().take(14) {
-                    println!(
-                        "      {n}: {} rays, wrong {:.1}% : normal {} early {} late {} lost {}",
-                        e[0],
-                        100.0 * (1.0 - e[1] as f64 / e[0] as f64),
-                        e[2],
-                        e[3],
-                        e[4],
-                        e[5]
-                    );
-                }
-            }
-            for (name, f) in [
-                ("origin&end same map", 0),
-                ("origin, end other", 1),
-                ("origin only", 2),
-                ("end only", 3),
-                ("neither", 4),
-            ] {
-                let pick: Vec<usize> = (0..rays.len())
-                    .filter(|&i| {
-                        truths[i].is_some()
-                            && (match (a[i] != 0, b[i] != 0) {
-                                (true, true) => {
-                                    if a[i] & b[i] != 0 {
-                                        0
-                                    } else {
-                                        1
-                                    }
-                                }
-                                (true, false) => 2,
-                                (false, true) => 3,
-                                _ => 4,
-                            }) == f
-                    })
-                    .collect();
-                let t: Vec<_> = pick.iter().map(|&i| truths[i]).collect();
-                let h: Vec<_> = pick.iter().map(|&i| hits[i]).collect();
-                let v = judge(&t, &h, bench.diagonal);
-                println!(
-                    "   {name}: {:.2} % of rays; correct {:.2} wrong {:.2} ({:.2}) lost {:.2} again {:.2} hybrid {:.2}",
-                    100.0 * pick.len() as f64 / rays.len() as f64,
-                    100.0 * v.correct,
-                    100.0 * v.wrong,
-                    100.0 * v.wrong_normal,
-                    100.0 * v.lost,
-                    100.0 * v.again,
-                    100.0 * v.hybrid
+                    ms * 1e3 / rays.len() as f64
                 );
             }
         }
@@ -230,9 +170,34 @@ fn study(bench: &mut Bench<'_>, name: &str, arguments: &Arguments) -> Result<(),
     Ok(())
 }
 
+/// Correct to errors, as cells of a row.
+fn shares(verdict: &Verdict) -> String {
+    let v = verdict;
+    let p = |share: f64| format!("{:.2}", 100.0 * share);
+    let small = |share: f64| format!("{:.3}", 100.0 * share);
+    format!(
+        "{} | {} ({}) | {} | {} | {} → {} | {}, {}",
+        p(v.correct),
+        p(v.wrong),
+        p(v.wrong_normal),
+        p(v.lost),
+        p(v.ghost),
+        p(v.again),
+        p(v.hybrid),
+        small(v.error[0]),
+        small(v.error[1])
+    )
+}
+
 fn fetches(hits: &[SurfaceHit]) -> String {
     let mut all: Vec<f64> = hits.iter().map(|h| f64::from(h.fetches)).collect();
     let mean = all.iter().sum::<f64>() / all.len() as f64;
-    let [a, b, c] = [0.5, 0.95, 0.99].map(|part| percentile(&mut all, part));
-    format!("{mean:.0}, {a}, {b}, {c}")
+    let [median, high, highest] = [0.5, 0.95, 0.99].map(|part| percentile(&mut all, part));
+    format!("{mean:.0}, {median}, {high}, {highest}")
+}
+
+/// What the tables that compare something else than maps take: eight maps of 256² texels.
+fn usual_maps(bench: &mut Bench<'_>, selector: &mut Selector) -> Result<Maps, Error> {
+    let centers = selector.select(bench, 8, CoverageMeasure::Photons)?.centers;
+    bench.capture(&centers, 256)
 }

@@ -3,18 +3,18 @@
 use super::bench::{BOUNCES, Bench};
 use super::common::adapter::Gpu;
 use lightfall::Error;
-use lightfall::frame::Settings;
+use lightfall::frame::{Settings, TracerKind};
 use lightfall::glam::Vec3;
 use lightfall::pass::{
-    CoverageMeasure, EnvMapSelector, EnvMapSelectorResources, EnvMapSelectorSettings, SelectBlockingInputs, Selection,
-    Sight,
+    CoverageMeasure, EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings,
+    ImageSpaceTracer, ImageSpaceTracerSettings, SelectBlockingInputs, Selection, SelectionStep, Sight, TraceMethod,
 };
-use lightfall::resource::Photons;
+use lightfall::resource::{CaptureView, Photons, SurfaceRay};
 
 /// Photons that tell the selector what light reaches.
 const PHOTONS: u32 = 100_000;
-/// Rounds of tracing them, as `GiRenderer::place_env_maps_blocking` does.
-const ROUNDS: u32 = 2;
+/// Most maps in the table.
+const MOST: u32 = 16;
 
 /// Candidates of a scene, captured, and photons to choose by.
 pub(crate) struct Selector {
@@ -38,31 +38,21 @@ impl Selector {
             settings: EnvMapSelectorSettings {
                 candidates,
                 coverage_target: 1.0,
-                clearance: std::env::var("CLEAR").ok().and_then(|c| c.parse().ok()).unwrap_or(0.03),
                 ..Default::default()
             },
             photons: None,
             tag: 0,
         };
-        for _ in 0..ROUNDS {
-            let limit = Settings::balanced().env_map_count;
-            let centers = selector.select(bench, limit, CoverageMeasure::Photons)?.centers;
-            let settings = Settings {
-                photons: PHOTONS,
-                bounces: BOUNCES,
-                env_map_count: limit,
-                tracer_kind: if std::env::var("IMG").is_ok() {
-                    lightfall::frame::TracerKind::ImageSpace
-                } else {
-                    lightfall::frame::TracerKind::Bvh
-                },
-                ..Settings::balanced()
-            };
-            let records = bench.photons(&settings, &centers)?;
-            let photons = Photons::new(device, PHOTONS, BOUNCES)?;
-            queue.write_buffer(photons.buffer(), 0, bytemuck::cast_slice(&records));
-            selector.photons = Some(photons);
-        }
+        let settings = Settings {
+            tracer_kind: TracerKind::Bvh,
+            photons: PHOTONS,
+            bounces: BOUNCES,
+            ..Settings::balanced()
+        };
+        let records = bench.photons(&settings, &[])?;
+        let photons = Photons::new(device, PHOTONS, BOUNCES)?;
+        queue.write_buffer(photons.buffer(), 0, bytemuck::cast_slice(&records));
+        selector.photons = Some(photons);
         Ok(selector)
     }
 
@@ -150,12 +140,7 @@ impl Sights {
 }
 
 /// Prints, for each number of maps, which share of the points that light reaches they truly see.
-pub(crate) fn table(
-    bench: &mut Bench<'_>,
-    selector: &mut Selector,
-    points: &[(Vec3, Vec3)],
-    most: u32,
-) -> Result<(), Error> {
+pub(crate) fn table(bench: &mut Bench<'_>, selector: &mut Selector, points: &[(Vec3, Vec3)]) -> Result<(), Error> {
     let mut sights = Sights(vec![vec![0; points.len().div_ceil(64)]; selector.candidates().len()]);
     for (first, group) in (0..).step_by(32).zip(selector.candidates().chunks(32)) {
         for (point, seen) in bench.seen_from(points, group)?.into_iter().enumerate() {
@@ -180,7 +165,7 @@ pub(crate) fn table(
     println!("| k | random, mean of 100 and least | Eq. 1 | photons | exact | photons against exact |");
     println!("|---|---|---|---|---|---|");
     let mut random = 1u64;
-    for k in 1..=most {
+    for k in 1..=MOST {
         let draws: Vec<f64> = (0..100)
             .map(|_| {
                 let mut pool = valid.clone();
@@ -205,6 +190,59 @@ pub(crate) fn table(
             "| {k} | {mean:.2}, {least:.2} | {area:.2} | {photons:.2} | {exact:.2} | {:.2} |",
             100.0 * photons / exact
         );
+    }
+    Ok(())
+}
+
+/// Prints what each step takes: selection, maintenance, capture, hierarchies, tracing.
+pub(crate) fn times(bench: &mut Bench<'_>, selector: &mut Selector, rays: &[SurfaceRay]) -> Result<(), Error> {
+    let maps = super::usual_maps(bench, selector)?;
+    let all = selector.candidates().len();
+    let mut views: Vec<CaptureView> = selector.resources.views(0..all).collect();
+    bench.prepare(&mut views)?;
+    println!(
+        "\nMilliseconds on the wall; 8 maps of 256², {all} candidates, {} rays.\n",
+        rays.len()
+    );
+    println!("| step | ms |");
+    println!("|---|---|");
+    let part = all.div_ceil(selector.settings.interval as usize);
+    for (name, candidates, step) in [
+        ("capture of all candidates", 0..all, SelectionStep::Capture),
+        ("selection of 8, by photons", 0..0, SelectionStep::Select),
+        (
+            "capture of a fifth of the candidates, each frame of a scene that changes",
+            0..part,
+            SelectionStep::Capture,
+        ),
+        ("one maintenance step, each fifth frame", 0..0, SelectionStep::Maintain),
+    ] {
+        let inputs = EnvMapSelectorInputs {
+            queue: &bench.gpu.queue,
+            geometry: &bench.geometry,
+            views: &views[..6 * candidates.len()],
+            candidates,
+            step,
+            limit: 8,
+            radius: bench.frame.radius(),
+            tag: selector.tag,
+            provisional: None,
+            photons: selector.photons.as_ref(),
+            settings: &selector.settings,
+            timestamps: None,
+        };
+        let ms = bench.time(|encoder| {
+            selector.pass.record(encoder, &mut selector.resources, &inputs);
+            Ok(())
+        })?;
+        println!("| {name} | {ms:.1} |");
+    }
+    println!("| capture of 8 maps | {:.1} |", maps.capture_ms);
+    println!("| their hierarchies | {:.1} |", maps.build_ms);
+    for method in TraceMethod::ALL {
+        let tracer = ImageSpaceTracer::new(&bench.gpu.device, method);
+        let (_, ms) = bench.trace(&tracer, &ImageSpaceTracerSettings::default(), &maps, rays)?;
+        println!("| rays, {method:?} | {ms:.1} |");
     }
     Ok(())
 }

@@ -11,25 +11,28 @@
 const BEYOND: f32 = 0.02;
 // Neighbours show the same surface if they lie this near to the texel's plane, as a share of inverse depth.
 const AGREEMENT: f32 = 0.01;
+// Least depth, unit frame.
+const NEAREST: f32 = 0x1p-14;
 
-// Point of the surface that a texel shows, in the frame of a face (right, down, forward); w: 0 where there is none. The
-// texel may lie beyond the face's border: then another face shows it.
-fn neighbour(map: u32, face: u32, at: vec2i, size: u32) -> vec4f {
-    let d = cube_face_direction(face, (vec2f(at) + 0.5) / f32(size));
-    var direction = d;
-    var distance: f32;
+// Where a texel's surface lies as a face sees it: place in [-1, 1]^2 and inverse depth, 0 where there is none. The texel may
+// lie beyond the face's border: then another face shows it.
+fn neighbour(map: u32, face: u32, at: vec2i, size: u32) -> vec3f {
+    let middle = 2.0 * (vec2f(at) + 0.5) / f32(size) - 1.0;
     if all(at >= vec2i(0)) && all(at < vec2i(i32(size))) {
-        distance = bitcast<f32>(env_map_load(map, face, vec2u(at)).x);
-    } else {
-        let point = cube_face_point(d);
-        let texel = cube_face_texel(point.uv, size);
-        direction = cube_face_direction(point.face, (vec2f(texel) + 0.5) / f32(size));
-        distance = bitcast<f32>(env_map_load(map, point.face, texel).x);
+        let distance = bitcast<f32>(env_map_load(map, face, vec2u(at)).x);
+        return vec3f(middle, select(0.0, length(vec3f(middle, 1.0)) / distance, distance > 0.0));
     }
+    let point = cube_face_point(cube_face_direction(face, 0.5 + 0.5 * middle));
+    let texel = cube_face_texel(point.uv, size);
+    let distance = bitcast<f32>(env_map_load(map, point.face, texel).x);
     if distance <= 0.0 {
-        return vec4f(0.0);
+        return vec3f(middle, 0.0);
     }
-    return vec4f(env_map_face_frame(face, normalize(direction) * distance), 1.0);
+    let direction = normalize(cube_face_direction(point.face, (vec2f(texel) + 0.5) / f32(size)));
+    let p = env_map_face_frame(face, direction * distance);
+    // At or behind the plane of the face's centre it is beside the face, as near as one likes.
+    let w = 1.0 / max(p.z, NEAREST);
+    return vec3f(p.xy * w, w);
 }
 
 @compute @workgroup_size(8, 8)
@@ -53,12 +56,9 @@ fn measure_texels(@builtin(global_invocation_id) id: vec3u) {
     var agreeing = 15u;
     for (var i = 0; i < 9; i++) {
         let offset = vec2i(i % 3 - 1, i / 3 - 1);
-        let p = neighbour(map, face, vec2i(id.xy) + offset, size);
-        // What lies at or behind the face's plane of view is beside the face, as near as one likes.
-        let w = select(0.0, 1.0 / max(p.z, 1e-6), p.w > 0.0);
-        seen = DepthRange(min(seen.least, w), max(seen.greatest, w));
-        let expected = dot(plane, vec3f(p.xy * w, 1.0));
-        if p.w <= 0.0 || abs(expected - w) > AGREEMENT * w {
+        let n = neighbour(map, face, vec2i(id.xy) + offset, size);
+        seen = DepthRange(min(seen.least, n.z), max(seen.greatest, n.z));
+        if n.z <= 0.0 || abs(dot(plane, vec3f(n.xy, 1.0)) - n.z) > AGREEMENT * n.z {
             let left = offset.x <= 0;
             let right = offset.x >= 0;
             let above = offset.y <= 0;

@@ -30,24 +30,34 @@ fn see_samples(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
     }
 }
 
-// Samples of a word that some of the selected maps see.
-fn samples_seen(word: u32, maps: u32) -> u32 {
-    var bits = 0u;
+// Samples of a word that some of these maps see, and those that at least two of them see.
+fn samples_seen(word: u32, maps: u32) -> vec2u {
+    var seen = vec2u(0u);
     for (var left = maps; left != 0u; left &= left - 1u) {
-        bits |= seen_by[selection.chosen[countTrailingZeros(left)] * CANDIDATE_TEXELS + word];
+        let own = seen_by[selection.chosen[countTrailingZeros(left)] * CANDIDATE_TEXELS + word];
+        seen = vec2u(seen.x | own, seen.y | (seen.x & own));
     }
-    return bits;
+    return seen;
 }
 
-// This lane's part of the samples that a candidate sees, and that no selected map does; and no other selected map.
+// A second look at a sample counts as little as this against a first: it decides where nothing new is to be seen.
+const SAMPLES_SECOND_LOOK: f32 = 0.05;
+
+// What a candidate's view of a word is worth beside what other maps see.
+fn samples_worth(own: u32, others: vec2u) -> f32 {
+    return f32(countOneBits(own & ~others.x)) + SAMPLES_SECOND_LOOK * f32(countOneBits(own & others.x & ~others.y));
+}
+
+// This lane's part of what a candidate's view is worth beside the selected maps, and beside the other selected maps.
 fn samples_unseen(candidate: u32, lane: u32, others: u32) -> vec2f {
-    var counts = vec2f(0.0);
+    var worth = vec2f(0.0);
     for (var word = lane; word < samples_words(); word += LANES) {
         let own = seen_by[candidate * CANDIDATE_TEXELS + word];
-        counts.x += f32(countOneBits(own & ~samples_seen(word, selection.selected)));
-        counts.y += f32(countOneBits(own & ~samples_seen(word, others)));
+        worth += vec2f(
+            samples_worth(own, samples_seen(word, selection.selected)), samples_worth(own, samples_seen(word, others)),
+        );
     }
-    return counts;
+    return worth;
 }
 
 // This lane's part of the samples that valid candidates see, those that selected maps do not see first.
@@ -61,7 +71,7 @@ fn samples_uncovered(lane: u32) -> vec2f {
             }
         }
         counts += vec2f(
-            f32(countOneBits(reachable & ~samples_seen(word, selection.selected))), f32(countOneBits(reachable)),
+            f32(countOneBits(reachable & ~samples_seen(word, selection.selected).x)), f32(countOneBits(reachable)),
         );
     }
     return counts;

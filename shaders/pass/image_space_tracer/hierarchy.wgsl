@@ -14,7 +14,7 @@ const HIERARCHY_CRACK: f32 = 0.25;
 // behind thin things (`docs/tracing.md`).
 const HIERARCHY_THICKNESS: f32 = 1.08;
 // A ray starts on a surface, so that it begins with small squares.
-const HIERARCHY_FIRST_LEVEL: u32 = 2u;
+const HIERARCHY_FIRST_LEVEL: u32 = 3u;
 // Less depth than this there is not: a ray past the map's centre goes from one face to the opposite one.
 const HIERARCHY_NEAREST: f32 = 0x1p-14;
 // A straight line crosses at most four faces; more only where it runs along an edge.
