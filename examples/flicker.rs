@@ -320,8 +320,8 @@ impl Player<'_> {
     /// It is read off an image of the same motion in which still surfaces glow. Depth and colour in a G-buffer would
     /// not do: they stay the same where an object slides along a plane of its own. Nor would direct light: it is as
     /// black on an object that moves in the shade as on the floor there. Surfaces do not glow on their backs, so that
-    /// still ones seen from behind are left out, which only makes the region smaller; the sky is left out too. No photon
-    /// is traced for it, so that it is the same for all tracers.
+    /// still ones seen from behind are left out, which only makes the region smaller; the sky is left out too. No
+    /// photon is traced for it, so that it is the same for all tracers.
     ///
     /// # Errors
     /// One line if rendering fails or there is no such pixel.

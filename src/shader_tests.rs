@@ -235,7 +235,7 @@ fn twins() -> Vec<Twin> {
             photon_count, light_count, sample_offset, shadow_map_size, row,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "Params", image_space_tracer::gpu::Params {
-            map_count, map_size, iterations, epsilon, most_fetches,
+            map_count, map_size, iterations, epsilon, most_fetches, doubts_normals,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "ListParams", image_space_tracer::gpu::ListParams { ray_count, row }),
         twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "SurfaceRay", SurfaceRay { position, normal, direction, pad }),

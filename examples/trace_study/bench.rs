@@ -90,15 +90,16 @@ impl<'a> Bench<'a> {
 
     /// Rays of diffuse light from where light that has bounced at least once arrives.
     pub(crate) fn rays(&mut self, count: usize) -> Result<Vec<SurfaceRay>, Error> {
-        let paths = (count as u32).div_ceil(BOUNCES) + 1000;
+        // Of a sun's photons most may miss what there is to see.
+        let paths = 8 * (count as u32).div_ceil(BOUNCES) + 10_000;
         let settings = Settings {
             tracer_kind: TracerKind::Bvh,
             bounces: BOUNCES,
-            photons: 2 * paths,
+            photons: paths,
             ..Settings::balanced()
         };
         let photons = self.photons(&settings, &[])?;
-        let stored: Vec<_> = photons[2 * paths as usize..]
+        let stored: Vec<_> = photons[paths as usize..]
             .iter()
             .filter(|p| p.state() == PhotonState::Stored)
             .collect();

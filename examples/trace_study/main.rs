@@ -133,30 +133,37 @@ fn methods(
          mean, 50, 95, 99 % | µs a ray |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|");
-    let variants = TraceMethod::ALL.into_iter().flat_map(|method| {
-        let iterations: &[u32] = match method {
-            TraceMethod::Paper => &[3, 5, 8],
-            _ => &[8],
+    let mut tracers = Vec::new();
+    for method in TraceMethod::ALL {
+        let usual = ImageSpaceTracerSettings::default();
+        let mut add = |name: String, settings| {
+            tracers.push((name, ImageSpaceTracer::new(&bench.gpu.device, method), settings));
         };
-        iterations.iter().map(move |&iterations| (method, iterations))
-    });
-    let tracers: Vec<_> = variants
-        .map(|(method, iterations)| (ImageSpaceTracer::new(&bench.gpu.device, method), iterations))
-        .collect();
+        match method {
+            TraceMethod::Paper => {
+                for iterations in [3, 5, 8] {
+                    add(
+                        format!("Paper, {iterations} iterations"),
+                        ImageSpaceTracerSettings { iterations, ..usual },
+                    );
+                }
+            }
+            _ => add(format!("{method:?}"), usual),
+        }
+        if method == TraceMethod::VerifiedWalk {
+            let doubting = ImageSpaceTracerSettings {
+                doubts_normals: true,
+                ..usual
+            };
+            add("VerifiedWalk, doubts normals".into(), doubting);
+        }
+    }
     for &count in &arguments.maps {
         let centers = selector.select(bench, count, CoverageMeasure::Photons)?.centers;
         for &size in &arguments.sizes {
             let maps = bench.capture(&centers, size)?;
-            for (tracer, iterations) in &tracers {
-                let settings = ImageSpaceTracerSettings {
-                    iterations: *iterations,
-                    ..Default::default()
-                };
-                let (hits, ms) = bench.trace(tracer, &settings, &maps, rays)?;
-                let name = match tracer.method() {
-                    TraceMethod::Paper => format!("paper, {iterations} iterations"),
-                    method => format!("{method:?}"),
-                };
+            for (name, tracer, settings) in &tracers {
+                let (hits, ms) = bench.trace(tracer, settings, &maps, rays)?;
                 let verdict = judge(truths, &hits, bench.diagonal);
                 println!(
                     "| {name} | {count} | {size} | {} | {} | {:.2} |",

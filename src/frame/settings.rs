@@ -362,6 +362,9 @@ const KNOBS: &[Knob] = &[
         tracer.most_fetches,
         |_| { true }
     ),
+    field!("tracer.doubts_normals", "true or false", tracer.doubts_normals, |_| {
+        true
+    }),
     field!("tracer.roulette_from", "1 or more", tracer.roulette_from, |v| v >= 1),
     choice!(
         "splatter.shape",

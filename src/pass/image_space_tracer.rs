@@ -25,6 +25,7 @@ pub(crate) mod gpu {
         pub(crate) iterations: u32,
         pub(crate) epsilon: f32,
         pub(crate) most_fetches: u32,
+        pub(crate) doubts_normals: u32,
     }
 
     /// Twin of `ListParams` in `shaders/pass/image_space_tracer/trace_rays.wgsl`.
@@ -100,6 +101,9 @@ pub struct ImageSpaceTracerSettings {
     pub iterations: u32,
     /// Fetches after which a walk over hierarchies gives a ray up as lost, for a surer tracer to find; 0: never.
     pub most_fetches: u32,
+    /// Whether walks over hierarchies call a hit tentative where neighbouring texels face different ways, so that the facet
+    /// that is hit may be another. A surer tracer then finds the right normal of nearly all; it has more to do.
+    pub doubts_normals: bool,
     /// Scatterings before Russian roulette may end a path. Lower is faster and noisier.
     pub roulette_from: u32,
 }
@@ -109,6 +113,7 @@ impl Default for ImageSpaceTracerSettings {
         Self {
             iterations: 8,
             most_fetches: 0,
+            doubts_normals: false,
             roulette_from: 4,
         }
     }
@@ -350,6 +355,7 @@ impl ImageSpaceTracer {
                 0 => u32::MAX,
                 most => most,
             },
+            doubts_normals: u32::from(settings.doubts_normals),
         };
         queue.write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
         let bound = [

@@ -11,28 +11,40 @@
 const BEYOND: f32 = 0.02;
 // Neighbours show the same surface if they lie this near to the texel's plane, as a share of inverse depth.
 const AGREEMENT: f32 = 0.01;
+// Cosine of the angle, 10 degrees, within which they face the same way.
+const ALIKE: f32 = 0.985;
 // Least depth, unit frame.
 const NEAREST: f32 = 0x1p-14;
 
-// Where a texel's surface lies as a face sees it: place in [-1, 1]^2 and inverse depth, 0 where there is none. The texel may
-// lie beyond the face's border: then another face shows it.
-fn neighbour(map: u32, face: u32, at: vec2i, size: u32) -> vec3f {
+struct Neighbour {
+    // As the face sees it, in [-1, 1]^2
+    place: vec2f,
+    // Inverse depth; 0: there is no surface
+    w: f32,
+    normal: vec3f,
+}
+
+// A texel of a face, or one beyond its border, which another face shows.
+fn neighbour(map: u32, face: u32, at: vec2i, size: u32) -> Neighbour {
     let middle = 2.0 * (vec2f(at) + 0.5) / f32(size) - 1.0;
     if all(at >= vec2i(0)) && all(at < vec2i(i32(size))) {
-        let distance = bitcast<f32>(env_map_load(map, face, vec2u(at)).x);
-        return vec3f(middle, select(0.0, length(vec3f(middle, 1.0)) / distance, distance > 0.0));
+        let bits = env_map_load(map, face, vec2u(at));
+        let distance = bitcast<f32>(bits.x);
+        let w = select(0.0, length(vec3f(middle, 1.0)) / distance, distance > 0.0);
+        return Neighbour(middle, w, octahedral_unpack(bits.y));
     }
     let point = cube_face_point(cube_face_direction(face, 0.5 + 0.5 * middle));
     let texel = cube_face_texel(point.uv, size);
-    let distance = bitcast<f32>(env_map_load(map, point.face, texel).x);
+    let bits = env_map_load(map, point.face, texel);
+    let distance = bitcast<f32>(bits.x);
     if distance <= 0.0 {
-        return vec3f(middle, 0.0);
+        return Neighbour(middle, 0.0, vec3f(0.0));
     }
     let direction = normalize(cube_face_direction(point.face, (vec2f(texel) + 0.5) / f32(size)));
     let p = env_map_face_frame(face, direction * distance);
     // At or behind the plane of the face's centre it is beside the face, as near as one likes.
     let w = 1.0 / max(p.z, NEAREST);
-    return vec3f(p.xy * w, w);
+    return Neighbour(p.xy * w, w, octahedral_unpack(bits.y));
 }
 
 @compute @workgroup_size(8, 8)
@@ -52,13 +64,16 @@ fn measure_texels(@builtin(global_invocation_id) id: vec3u) {
     let plane = env_map_plane(surface, face, middle);
     let own = dot(plane, vec3f(middle, 1.0));
     var seen = DepthRange(own, own);
-    // Bit by quadrant; a neighbour that disagrees clears those it belongs to.
-    var agreeing = 15u;
+    // Bit by quadrant, then one for normals; a neighbour that disagrees clears those it belongs to.
+    var agreeing = 31u;
     for (var i = 0; i < 9; i++) {
         let offset = vec2i(i % 3 - 1, i / 3 - 1);
         let n = neighbour(map, face, vec2i(id.xy) + offset, size);
-        seen = DepthRange(min(seen.least, n.z), max(seen.greatest, n.z));
-        if n.z <= 0.0 || abs(dot(plane, vec3f(n.xy, 1.0)) - n.z) > AGREEMENT * n.z {
+        seen = DepthRange(min(seen.least, n.w), max(seen.greatest, n.w));
+        if n.w <= 0.0 || dot(n.normal, surface.normal) < ALIKE {
+            agreeing &= 15u;
+        }
+        if n.w <= 0.0 || abs(dot(plane, vec3f(n.place, 1.0)) - n.w) > AGREEMENT * n.w {
             let left = offset.x <= 0;
             let right = offset.x >= 0;
             let above = offset.y <= 0;

@@ -111,6 +111,9 @@ fn hierarchy_crossing(found: MapTrace, is_certain: bool, ray: FaceRay, cell: vec
     let is_sure = depth_range_agrees(bits, u32(in_texel.x > 0.5) + 2u * u32(in_texel.y > 0.5));
     if is_certain && is_sure {
         result.kind = HIT_SURFACE;
+        if params.doubts_normals == 1u && !depth_range_is_flat(bits) {
+            result.hit.kind = HIT_TENTATIVE;
+        }
     } else if is_certain {
         let texel = 2.0 * length(result.hit.position) / f32(params.map_size);
         result.free = clamp(t - max(HIERARCHY_LEAST_UNSURE, HIERARCHY_UNSURE * texel), start, result.free);

@@ -11,9 +11,11 @@ fn nearest_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
         let center = centers[map].xyz;
         let x = origin - center;
         let found = trace_map(map, x, r, 0.0, TRACE_FURTHEST, trace_sees(map, x, normal));
-        if found.hit.kind == HIT_SURFACE && (best.kind != HIT_SURFACE || found.hit.distance < best.distance) {
+        let is_hit = found.kind == HIT_SURFACE || found.hit.kind == HIT_SURFACE;
+        if is_hit && (best.kind != HIT_SURFACE || found.hit.distance < best.distance) {
             best = found.hit;
             best.position += center;
+            best.kind = HIT_SURFACE;
         } else if found.kind == HIT_ESCAPED && best.kind == HIT_LOST {
             best.kind = HIT_ESCAPED;
         }

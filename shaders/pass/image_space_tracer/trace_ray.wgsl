@@ -11,6 +11,8 @@ struct Params {
     epsilon: f32,
     // Most fetches of the hierarchical walk for a ray; what it has not found by then it cannot tell
     most_fetches: u32,
+    // 1: a certain hit is tentative all the same where the map is too coarse for the surface's facets
+    doubts_normals: u32,
 }
 
 @group(1) @binding(0) var<uniform> params: Params;
