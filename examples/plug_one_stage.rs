@@ -312,6 +312,7 @@ impl Walk {
             env_maps: &self.env_maps,
             geometry: engine,
             views: &self.views,
+            layers: None,
             timestamps: None,
         };
         self.capture.record(encoder, &mut self.capture_resources, &inputs);

@@ -306,7 +306,7 @@ fn twins() -> Vec<Twin> {
         }),
         twin!(wgsl::ENV_MAP_SELECTOR_SAMPLES, "SurfaceSample", env_map_selector::gpu::SurfaceSample { position, normal }),
         twin!(wgsl::ENV_MAP_SELECTOR, "Sight", env_map_selector::gpu::SightRecord {
-            surfaces, back_faces, nearest, is_valid, area, unseen, own, pad,
+            surfaces, back_faces, nearest, is_valid, area, unseen, own, exchange,
         }),
         twin!(wgsl::ENV_MAP_SELECTOR, "Selection", env_map_selector::gpu::SelectionRecord {
             tag, selected, newest, is_done, is_stable, swaps, coverage, pad, chosen,

@@ -322,6 +322,7 @@ pub const MODULES: &[(&str, &str)] = &[
 /// Functions of `shaders/common/` that tests compare with `f64` twins.
 #[doc(hidden)]
 pub const COMMON: &str = compose![
+    "common/depth_range.wgsl",
     "common/lost_rays.wgsl",
     "common/photon.wgsl",
     "common/subsampling.wgsl",

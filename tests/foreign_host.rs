@@ -543,6 +543,7 @@ fn captured(engine: &Engine, geometry: &mut dyn Geometry, indirect: &IndirectLig
         env_maps: &env_maps,
         geometry,
         views: &views,
+        layers: None,
         timestamps: None,
     };
     let mut resources = EnvMapCaptureResources::new(device, Walk::MAP_SIZE).unwrap();

@@ -8,7 +8,7 @@ use lightfall::frame::{GiRenderer, SceneInputs, Settings, Stage, TracerKind, Vie
 use lightfall::glam::{DVec3, Vec3};
 use lightfall::pass::*;
 use lightfall::resource::*;
-use lightfall::scene::{EnvironmentImage, Light, LightKind, Material, Scene, SceneSummary, samples};
+use lightfall::scene::{EnvironmentImage, Light, LightKind, Material, Scene, SceneBounds, SceneSummary, samples};
 use lightfall::{creation_count, read_rgba32float_blocking, wgpu};
 use std::f64::consts::PI;
 
@@ -260,6 +260,7 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
         env_maps: &env_maps,
         geometry: &geometry,
         views: &views[maps_from..],
+        layers: None,
         timestamps,
     };
     let mut map_depth = EnvMapCaptureResources::new(device, settings.env_map_size).unwrap();
@@ -278,11 +279,13 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
     bvh.prepare(queue, &frame).unwrap();
     let hierarchy = DepthHierarchy::new(device, &env_maps).unwrap();
     let build_inputs = DepthHierarchyBuildInputs {
+        queue,
         env_maps: &env_maps,
         hierarchy: &hierarchy,
+        maps: None,
         timestamps,
     };
-    let mut build = DepthHierarchyBuildResources::new();
+    let mut build = DepthHierarchyBuildResources::new(device).unwrap();
     DepthHierarchyBuild::new(device).record(&mut encoder, &mut build, &build_inputs);
     let maps = (&env_maps, Some(&hierarchy));
     walk_by_hand(&mut encoder, (device, queue), settings, maps, (&bvh, &photons));
@@ -616,6 +619,94 @@ fn each_tracer_allocates_and_records_what_it_reads_and_no_more() {
     // Each of three hops is walked, listed and walked again.
     let hybrid = measure(TracerKind::Hybrid, 3);
     assert_eq!(hybrid, (image_space.0 - 1 + 3 * 3, [true; 3]));
+    assert_no_errors(&gpu);
+}
+
+/// World box of an instance.
+fn extent(scene: &Scene, instance: usize) -> SceneBounds {
+    let instance = &scene.instances[instance];
+    let world = scene.meshes[instance.mesh].positions.iter().map(|&p| {
+        let position = Vec3::from(p).as_dvec3();
+        instance.transform.transform_point3(position)
+    });
+    let (min, max) = world.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), p| {
+        (min.min(p), max.max(p))
+    });
+    SceneBounds::new(min, max).unwrap()
+}
+
+#[test]
+fn only_what_may_have_changed_is_captured_again_and_no_pixel_tells() {
+    let Some(gpu) = gpu() else { return };
+    let (device, queue) = (&gpu.device, &gpu.queue);
+    let first = samples::cornell(0.0);
+    let centers = [(2.8, 4.0, 1.0), (0.7, 2.5, 2.5), (4.8, 2.0, 1.5)].map(|(x, y, z)| DVec3::new(x, y, z));
+    let images = |says_what_changed: bool| {
+        let mut geometry = MeshGeometry::new(device, queue, &first).unwrap();
+        let mut bvh = triangles(device, queue, &first);
+        let mut renderer = GiRenderer::new(device, &small()).unwrap();
+        let summary = SceneSummary::of(&first).unwrap();
+        renderer.set_scene(queue, &summary, &first.lights).unwrap();
+        renderer.set_env_map_centers(queue, &centers).unwrap();
+        let mut view = renderer.new_view([32, 32]).unwrap();
+        let mut last = first.clone();
+        let mut shown = Vec::new();
+        for time in [0.0, 0.0, 0.4, 0.8, 0.8] {
+            let scene = samples::cornell(time);
+            let moved = (0..scene.instances.len()).filter(|&i| scene.instances[i] != last.instances[i]);
+            let changes: Vec<_> = moved.flat_map(|i| [extent(&last, i), extent(&scene, i)]).collect();
+            for (index, instance) in scene.instances.iter().enumerate() {
+                geometry.set_transform(index, instance.transform).unwrap();
+            }
+            if says_what_changed {
+                renderer.set_changes(&changes);
+            }
+            let before = creation_count().passes;
+            let both = (&mut geometry, &mut bvh);
+            let encoder = record(&mut renderer, &mut view, both, &scene, (device, queue));
+            let passes = creation_count().passes - before;
+            queue.submit([encoder.finish()]);
+            let image = read_rgba32float_blocking(device, queue, view.radiance().view().texture()).unwrap();
+            shown.push((passes, image));
+            last = scene;
+        }
+        shown
+    };
+    let (always, wanted) = (images(false), images(true));
+    for (frame, (all, some)) in always.iter().zip(&wanted).enumerate() {
+        assert!(all.1 == some.1, "frame {frame}");
+        assert_eq!(all.0, always[0].0);
+    }
+    let passes: Vec<_> = wanted.iter().map(|w| w.0).collect();
+    println!("{passes:?} passes instead of {}", always[0].0);
+    // Nothing moved: neither the 18 faces nor their hierarchies. A block moved: some faces, and hierarchies.
+    assert_eq!(passes[0], always[0].0);
+    assert_eq!([passes[1], passes[4]], [always[0].0 - 19; 2]);
+    assert!(passes[2] < always[0].0 - 4 && passes[2] > passes[1] + 1);
+    assert_ne!(wanted[1].1, wanted[3].1, "the block moved");
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn maps_at_lights_stand_beside_those_selected() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::cornell(0.0);
+    let LightKind::Point { position, .. } = scene.lights[0].kind else {
+        panic!("the lamp of the box is a point");
+    };
+    let settings = Settings {
+        env_maps_at_lights: 2,
+        ..small()
+    };
+    let mut geometry = MeshGeometry::new(&gpu.device, &gpu.queue, &scene).unwrap();
+    let renderer = placed(&gpu, &settings, &scene, &mut geometry);
+    let plain = placed(&gpu, &small(), &scene, &mut geometry);
+    let centers = |renderer: &GiRenderer| renderer.env_maps().unwrap().centers().to_vec();
+    let mut expected = centers(&plain);
+    expected.push(renderer.frame().unwrap().point(position));
+    assert_eq!(centers(&renderer), expected);
+    let lit = offline::render(&gpu, &scene, &settings, [16, 16], Component::Indirect).unwrap();
+    assert!(mean(&lit, 16, 0, |_, _| true) > 0.0);
     assert_no_errors(&gpu);
 }
 

@@ -75,8 +75,10 @@ impl<'a> World<'a> {
         let mut resources = ImageSpaceTracerResources::for_shared_hops(device, BOUNCES).unwrap();
         let hierarchy = DepthHierarchy::new(device, env_maps).unwrap();
         let build_inputs = DepthHierarchyBuildInputs {
+            queue: &self.gpu.queue,
             env_maps,
             hierarchy: &hierarchy,
+            maps: None,
             timestamps: None,
         };
         let inputs = ImageSpaceTracerInputs {
@@ -90,7 +92,7 @@ impl<'a> World<'a> {
             timestamps: None,
         };
         submit(self.gpu, |encoder| {
-            let mut build = DepthHierarchyBuildResources::new();
+            let mut build = DepthHierarchyBuildResources::new(device).unwrap();
             DepthHierarchyBuild::new(device).record(encoder, &mut build, &build_inputs);
             self.image_space_tracer
                 .record(encoder, &mut resources, &inputs)

@@ -150,6 +150,82 @@ fn packed_reflectance_is_off_by_half_a_quantum_at_most() {
 }
 
 #[test]
+fn a_depth_range_holds_what_was_packed_and_little_more() {
+    let Some(gpu) = gpu() else { return };
+    let mut random = Random(9);
+    // Inverse depths from beyond all rays to a ten-thousandth of the region; infinitely far; powers of two.
+    let mut inputs: Vec<[f32; 4]> = (0..100_000)
+        .map(|_| {
+            let [a, b] = [0, 1].map(|_| 2f32.powf(18.0 * random.unit() - 4.0));
+            [a.min(b), a.max(b), (random.bits() & 31) as f32, 0.0]
+        })
+        .collect();
+    inputs.extend((-4..14).map(|e| [2f32.powi(e), 2f32.powi(e), 0.0, 0.0]));
+    inputs.extend([[0.0, 0.0, 31.0, 0.0], [0.0, 7.5, 16.0, 0.0]]);
+    let outputs = run(
+        &gpu,
+        "let bits = depth_range_pack(DepthRange(input.x, input.y), u32(input.z));
+         let range = depth_range_unpack(bits);
+         var flags = 16u * u32(depth_range_is_flat(bits));
+         for (var quadrant = 0u; quadrant < 4u; quadrant++) {
+             flags += u32(depth_range_agrees(bits, quadrant)) << quadrant;
+         }
+         return vec4f(range.least, range.greatest, f32(flags), 0.0);",
+        &inputs,
+    );
+    for (input, output) in inputs.iter().zip(&outputs) {
+        let [least, greatest, flags, _] = *input;
+        assert!(output[0] <= least && output[1] >= greatest, "{input:?} {output:?}");
+        // 8 bits of mantissa; nearer than 2^-4 of nothing is as good as nothing.
+        assert!(
+            output[0] >= least * (1.0 - 1.0 / 256.0) || least <= 0.0626,
+            "{input:?} {output:?}"
+        );
+        assert!(
+            output[1] <= (greatest * (1.0 + 1.0 / 256.0)).max(0.0628),
+            "{input:?} {output:?}"
+        );
+        assert_eq!(output[2], flags);
+    }
+    assert_eq!(outputs[outputs.len() - 2], [0.0, 0.0, 31.0, 0.0]);
+}
+
+#[test]
+fn a_joined_depth_range_holds_both() {
+    let Some(gpu) = gpu() else { return };
+    let mut random = Random(10);
+    let inputs: Vec<[f32; 4]> = (0..10_000)
+        .map(|_| {
+            let mut pair = || {
+                let [a, b] = [0, 1].map(|_| {
+                    if random.unit() < 0.1 {
+                        0.0
+                    } else {
+                        2f32.powf(10.0 * random.unit() - 3.0)
+                    }
+                });
+                [a.min(b), a.max(b)]
+            };
+            let ([a, b], [c, d]) = (pair(), pair());
+            [a, b, c, d]
+        })
+        .collect();
+    let outputs = run(
+        &gpu,
+        "let a = depth_range_pack(DepthRange(input.x, input.y), 31u);
+         let b = depth_range_pack(DepthRange(input.z, input.w), 0u);
+         let both = depth_range_unpack(depth_range_join(a, b));
+         let own = depth_range_unpack(a);
+         let other = depth_range_unpack(b);
+         let is_least = both.least == min(own.least, other.least);
+         let is_greatest = both.greatest == max(own.greatest, other.greatest);
+         return vec4f(f32(is_least), f32(is_greatest), f32(depth_range_join(a, b) >> 26u), 0.0);",
+        &inputs,
+    );
+    assert!(outputs.iter().all(|o| *o == [1.0, 1.0, 0.0, 0.0]));
+}
+
+#[test]
 fn black_and_white_reflectance_are_exact_and_out_of_range_is_clamped() {
     let Some(gpu) = gpu() else { return };
     let inputs = [

@@ -216,16 +216,19 @@ impl<'a> Bench<'a> {
         let mut views: Vec<_> = maps.views(CapturePurpose::EnvMap).collect();
         self.prepare(&mut views)?;
         let mut capture = EnvMapCaptureResources::new(device, size)?;
-        let mut build = DepthHierarchyBuildResources::new();
+        let mut build = DepthHierarchyBuildResources::new(device)?;
         let capture_inputs = EnvMapCaptureInputs {
             env_maps: &maps,
             geometry: &self.geometry,
             views: &views,
+            layers: None,
             timestamps: None,
         };
         let build_inputs = DepthHierarchyBuildInputs {
+            queue,
             env_maps: &maps,
             hierarchy: &hierarchy,
+            maps: None,
             timestamps: None,
         };
         let builder = DepthHierarchyBuild::new(device);

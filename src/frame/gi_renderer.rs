@@ -7,6 +7,7 @@
 
 use super::env_map_placement::{EnvMapPlacement, PHOTON_ROUNDS, PlacementInputs, SelectionContext, Work};
 use super::indirect_scene::{IndirectScene, PhotonInputs, PhotonPasses};
+use super::recapture::Recapture;
 use super::{Plan, Settings, Stage};
 use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, CoverageMeasure, DirectLight, DirectLightInputs,
@@ -21,7 +22,7 @@ use crate::resource::{
     CameraView, CapturePurpose, CaptureView, DepthHierarchy, EnvMaps, GBuffer, Geometry, Irradiance, Lights,
     NearestOccluders, Photons, PrepareContext, Radiance, ShadowMaps, Subsampling, Visibility,
 };
-use crate::scene::{Light, SceneBounds, SceneSummary, UnitFrame};
+use crate::scene::{Light, LightKind, SceneBounds, SceneSummary, UnitFrame};
 use crate::{Error, Timestamps};
 use glam::DVec3;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -43,6 +44,9 @@ pub struct GiRenderer {
     views: Vec<CaptureView>,
     light_views: std::ops::Range<usize>,
     env_map_views: std::ops::Range<usize>,
+    recapture: Recapture,
+    /// Layers of the environment maps that this frame captures.
+    env_map_layers: Vec<u32>,
     /// That photons were last traced in.
     photons_frame: Option<UnitFrame>,
     /// This frame's share of the selection, and its views.
@@ -184,6 +188,8 @@ impl GiRenderer {
             views: Vec::new(),
             light_views: 0..0,
             env_map_views: 0..0,
+            recapture: Recapture::default(),
+            env_map_layers: Vec::new(),
             photons_frame: None,
             selection: None,
         })
@@ -265,6 +271,7 @@ impl GiRenderer {
             PhotonSplatterResources::check(device, &settings.splatter_config, settings.photons, settings.bounces)?;
             self.generation = next_generation();
             self.photons_frame = None;
+            self.recapture.forget();
             self.indirect = Some(IndirectScene::new(device, settings)?);
         }
         Ok(())
@@ -277,7 +284,13 @@ impl GiRenderer {
             return Ok(());
         };
         let context = selection_context(&self.device, queue, &self.settings, state);
-        env_maps.set_centers(queue, &self.placement.centers(&context))
+        let mut centers = self.placement.centers(&context);
+        let at_lights = state.lights.iter().filter_map(|light| match light.kind {
+            LightKind::Point { position, .. } | LightKind::Spot { position, .. } => Some(state.frame.point(position)),
+            _ => None,
+        });
+        centers.extend(at_lights.take(self.settings.env_maps_at_lights as usize));
+        env_maps.set_centers(queue, &centers)
     }
 
     /// As `apply_centers`, for new places: maps there are switched on, and what was planned for the selection is void.
@@ -367,10 +380,22 @@ impl GiRenderer {
     }
 
     /// Says that geometry has moved, appeared or gone since the last frame: the selection of places for environment maps
-    /// is then kept up to date until it comes to rest. Maps themselves are captured every frame in any case. Call it before
-    /// `prepare`; a change of the region is noticed without it.
+    /// is then kept up to date until it comes to rest. Call it before `prepare`; a change of the region is noticed without
+    /// it.
     pub fn geometry_changed(&mut self) {
         self.placement.geometry_changed();
+    }
+
+    /// Says where geometry, or what it looks like, has changed since the last frame, so that only those faces of
+    /// environment maps are captured that may show it; `&[]`: nowhere. Of an object that moved both its old box and its new
+    /// one are wanted. It counts for the next `prepare`, adds to what was said before it, and includes
+    /// [`GiRenderer::geometry_changed`] where there is a change. In frames without a word of it everything is captured. A
+    /// frame that was prepared has to be recorded and submitted, or its changes are missed.
+    pub fn set_changes(&mut self, changes: &[SceneBounds]) {
+        self.recapture.set_changes(changes);
+        if !changes.is_empty() {
+            self.geometry_changed();
+        }
     }
 
     /// Collects every view of the frame, numbers them, and lets the geometry prepare for them.
@@ -399,8 +424,12 @@ impl GiRenderer {
             self.views.extend(direct.shadow_maps.views(&state.frame, &state.lights));
         }
         let maps_from = self.views.len();
+        self.env_map_layers.clear();
         if let Some(env_maps) = self.indirect.as_ref().and_then(IndirectScene::env_maps) {
-            self.views.extend(env_maps.views(CapturePurpose::EnvMap));
+            self.env_map_layers = self.recapture.layers(&state.frame, env_maps.centers());
+            let all: Vec<_> = env_maps.views(CapturePurpose::EnvMap).collect();
+            self.views
+                .extend(self.env_map_layers.iter().map(|&layer| all[layer as usize]));
         }
         let selection_from = self.views.len();
         let has_photons = self.traced_photons().is_some();
@@ -442,6 +471,7 @@ impl GiRenderer {
                 lights: &direct.lights,
                 shadow_maps: &direct.shadow_maps,
                 views: &self.views[self.env_map_views.clone()],
+                layers: &self.env_map_layers,
             };
             indirect.record(encoder, &self.passes.photons, &photon_inputs)?;
             self.photons_frame = self.state.as_ref().map(|s| s.frame);

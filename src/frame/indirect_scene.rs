@@ -53,8 +53,10 @@ pub(super) struct PhotonInputs<'a> {
     pub(super) settings: &'a Settings,
     pub(super) lights: &'a Lights,
     pub(super) shadow_maps: &'a ShadowMaps,
-    /// Of the environment maps.
+    /// Of the environment maps to capture.
     pub(super) views: &'a [CaptureView],
+    /// The layers that these are of.
+    pub(super) layers: &'a [u32],
 }
 
 impl PhotonPasses {
@@ -78,11 +80,15 @@ impl IndirectScene {
         let shared_hops = if is_shared { settings.bounces } else { 0 };
         let photons = Photons::new(device, settings.photons, settings.bounces)?;
         let image_space = || {
-            let env_maps = EnvMaps::new(device, settings.env_map_count, settings.env_map_size)?;
+            let env_maps = EnvMaps::new(
+                device,
+                settings.env_map_count + settings.env_maps_at_lights,
+                settings.env_map_size,
+            )?;
             let hierarchy = || {
                 Ok((
                     DepthHierarchy::new(device, &env_maps)?,
-                    DepthHierarchyBuildResources::new(),
+                    DepthHierarchyBuildResources::new(device)?,
                 ))
             };
             Ok(ImageSpaceScene {
@@ -136,13 +142,18 @@ impl IndirectScene {
                 env_maps: &image_space.env_maps,
                 geometry: scene.geometry,
                 views: inputs.views,
+                layers: Some(inputs.layers),
                 timestamps: scene.timestamps,
             };
             passes
                 .env_map_capture
                 .record(encoder, &mut image_space.capture, &capture_inputs);
             if let (Some(build), Some((hierarchy, own))) = (&passes.depth_hierarchy_build, &mut image_space.hierarchy) {
+                let mut maps: Vec<u32> = inputs.layers.iter().map(|layer| layer / 6).collect();
+                maps.dedup();
                 let build_inputs = DepthHierarchyBuildInputs {
+                    queue: scene.queue,
+                    maps: Some(&maps),
                     env_maps: &image_space.env_maps,
                     hierarchy,
                     timestamps: scene.timestamps,
@@ -214,8 +225,8 @@ impl IndirectScene {
         if let Some(image_space) = &self.image_space {
             let maps = image_space.env_maps.memory_use() + image_space.capture.memory_use();
             list.push(("env_maps", maps));
-            if let Some((hierarchy, _)) = &image_space.hierarchy {
-                list.push(("depth_hierarchy", hierarchy.memory_use()));
+            if let Some((hierarchy, own)) = &image_space.hierarchy {
+                list.push(("depth_hierarchy", hierarchy.memory_use() + own.memory_use()));
             }
             uniforms += image_space.tracer.memory_use();
         }

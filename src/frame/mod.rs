@@ -5,6 +5,7 @@ mod env_map_placement;
 mod gi_renderer;
 mod indirect_scene;
 mod plan;
+mod recapture;
 mod settings;
 
 pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};

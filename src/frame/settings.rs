@@ -52,6 +52,9 @@ pub struct Settings {
     /// Most environment maps, 1 to 31; fewer are used where fewer see enough. More find more of what rays hit and cost six
     /// captures each.
     pub env_map_count: u32,
+    /// Further environment maps at the first so many point and spot lights, 0 to 8: what light from there meets next is seen
+    /// from where it comes. Each costs as much as any other map (`docs/tracing.md`).
+    pub env_maps_at_lights: u32,
     /// Texels along a face of an environment map. Finer resolves thinner things and costs memory and capture time as the
     /// square.
     pub env_map_size: u32,
@@ -113,6 +116,7 @@ impl Settings {
             photons: 100_000,
             bounces: 3,
             env_map_count: 12,
+            env_maps_at_lights: 0,
             env_map_size: 128,
             shadow_map_size: 512,
             soft_shadow: SoftShadowSettings::default(),
@@ -283,6 +287,7 @@ const KNOBS: &[Knob] = &[
     field!("bounces", "0 to 64", bounces, |v| v <= MAX_BOUNCES),
     field!("env_maps.count", "1 to 31", env_map_count, |v| (1..=MAX_SELECTED)
         .contains(&v)),
+    field!("env_maps.at_lights", "0 to 8", env_maps_at_lights, |v| v <= 8),
     field!("env_maps.size", "4 to 8192", env_map_size, |v| (4..=8192).contains(&v)),
     field!("shadow_maps.size", "4 to 8192", shadow_map_size, |v| (4..=8192)
         .contains(&v)),

@@ -6,10 +6,13 @@
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::{DepthHierarchy, EnvMaps, RANGE_FORMAT};
-use crate::{Timestamps, wgsl};
+use crate::{Error, Timestamps, wgsl};
 
 /// Bindings of both shaders in `shaders/pass/depth_hierarchy_build/`, in order.
-pub(crate) const SLOTS: [Slot; 2] = [Slot::UintArray, Slot::StorageArray(RANGE_FORMAT)];
+pub(crate) const SLOTS: [Slot; 3] = [Slot::UintArray, Slot::StorageArray(RANGE_FORMAT), Slot::Storage];
+
+/// More maps than fit the layers of a texture array under default limits.
+const MOST_MAPS: usize = 64;
 
 /// Invocations along a side of a workgroup.
 const GROUP: u32 = 8;
@@ -23,19 +26,24 @@ pub struct DepthHierarchyBuild {
     join: wgpu::ComputePipeline,
 }
 
-/// Bind groups.
+/// Which maps, and bind groups.
 #[derive(Debug)]
 pub struct DepthHierarchyBuildResources {
+    maps: wgpu::Buffer,
     groups: BindGroupCache,
 }
 
 /// What a frame gives it.
 #[derive(Debug, Clone, Copy)]
 pub struct DepthHierarchyBuildInputs<'a> {
+    /// For the list of maps.
+    pub queue: &'a wgpu::Queue,
     /// Captured.
     pub env_maps: &'a EnvMaps,
     /// Written; made for these maps.
     pub hierarchy: &'a DepthHierarchy,
+    /// Maps that were captured since; `None`: all that are in use.
+    pub maps: Option<&'a [u32]>,
     /// Sink for GPU time.
     pub timestamps: Option<&'a Timestamps>,
 }
@@ -73,24 +81,30 @@ impl DepthHierarchyBuild {
         }
     }
 
-    /// Records all levels, of the maps in use.
+    /// Records all levels. Of a map of which one face was captured all six are measured: texels at the border of a face look
+    /// at the next.
     pub fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         resources: &mut DepthHierarchyBuildResources,
         inputs: &DepthHierarchyBuildInputs<'_>,
     ) {
-        let layers = 6 * inputs.env_maps.centers().len() as u32;
-        if layers == 0 {
+        let in_use: Vec<u32> = (0..inputs.env_maps.centers().len() as u32).collect();
+        let maps = inputs.maps.unwrap_or(&in_use);
+        let maps = &maps[..maps.len().min(MOST_MAPS)];
+        if maps.is_empty() {
             return;
         }
+        inputs
+            .queue
+            .write_buffer(&resources.maps, 0, bytemuck::cast_slice(maps));
         let label = "lightfall::DepthHierarchyBuild";
         let levels = inputs.hierarchy.levels();
         let sources = std::iter::once(inputs.env_maps.view()).chain(levels);
         let groups: Vec<_> = sources
             .zip(levels)
             .map(|(source, target)| {
-                let bound = [source.into(), target.into()];
+                let bound = [source.into(), target.into(), (&resources.maps).into()];
                 resources.groups.get(&self.device, label, &self.layout, &bound)
             })
             .collect();
@@ -99,24 +113,30 @@ impl DepthHierarchyBuild {
             let side = (inputs.env_maps.size().next_power_of_two() >> level).div_ceil(GROUP);
             pass.set_pipeline(if level == 0 { &self.measure } else { &self.join });
             pass.set_bind_group(0, group, &[]);
-            pass.dispatch_workgroups(side, side, layers);
+            pass.dispatch_workgroups(side, side, 6 * maps.len() as u32);
         }
     }
 }
 
 impl DepthHierarchyBuildResources {
     /// For one set of maps.
-    pub fn new() -> Self {
-        Self::default()
-    }
-}
-
-impl Default for DepthHierarchyBuildResources {
-    fn default() -> Self {
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] if the device grants next to nothing.
+    pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
         /// Levels of the largest maps that there can be.
         const LEVELS: usize = 16;
-        Self {
+        use wgpu::BufferUsages as U;
+        let bytes = MOST_MAPS as u64 * size_of::<u32>() as u64;
+        let label = "lightfall::DepthHierarchyBuild::maps";
+        Ok(Self {
+            maps: device::buffer(device, label, bytes, U::STORAGE | U::COPY_DST)?,
             groups: BindGroupCache::for_uses(LEVELS),
-        }
+        })
+    }
+
+    /// Bytes allocated.
+    pub fn memory_use(&self) -> u64 {
+        self.maps.size()
     }
 }

@@ -26,8 +26,10 @@ pub struct EnvMapCaptureInputs<'a> {
     pub env_maps: &'a EnvMaps,
     /// The host's draws, prepared for a list of views that holds `views`.
     pub geometry: &'a dyn Geometry,
-    /// [`EnvMaps::views`], with their indices in the frame's list set.
+    /// [`EnvMaps::views`], or some of them, with their indices in the frame's list set.
     pub views: &'a [CaptureView],
+    /// The layer of each of these views. `None`: the first view is of layer 0, and so on.
+    pub layers: Option<&'a [u32]>,
     /// Sink for GPU time.
     pub timestamps: Option<&'a Timestamps>,
 }
@@ -38,14 +40,16 @@ impl EnvMapCapture {
         Self
     }
 
-    /// Records one render pass for each face.
+    /// Records one render pass for each view.
     pub fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         resources: &mut EnvMapCaptureResources,
         inputs: &EnvMapCaptureInputs<'_>,
     ) {
-        let faces = (0..).map_while(|layer| inputs.env_maps.face_view(layer));
+        let all: Vec<u32> = (0..inputs.views.len() as u32).collect();
+        let layers = inputs.layers.unwrap_or(&all);
+        let faces = layers.iter().map_while(|&layer| inputs.env_maps.face_view(layer));
         capture::record_layers(
             encoder,
             "lightfall::EnvMapCapture",

@@ -60,7 +60,7 @@ pub(crate) mod gpu {
         pub(crate) area: f32,
         pub(crate) unseen: f32,
         pub(crate) own: f32,
-        pub(crate) pad: u32,
+        pub(crate) exchange: f32,
     }
 
     /// Twin of `Selection`.
@@ -245,6 +245,8 @@ struct Steps {
     switch_maps: wgpu::ComputePipeline,
     pick_samples: wgpu::ComputePipeline,
     see_samples: wgpu::ComputePipeline,
+    try_exchanges: wgpu::ComputePipeline,
+    exchange_map: wgpu::ComputePipeline,
 }
 
 /// Candidates, their maps, and the selection so far.
@@ -345,6 +347,8 @@ impl EnvMapSelector {
             switch_maps: step!("switch_maps", &layout, &switch_layout),
             pick_samples: step!(wgsl::ENV_MAP_SELECTOR_SAMPLES, "pick_samples", &sample_layout),
             see_samples: step!("see_samples", &layout),
+            try_exchanges: step!("try_exchanges", &layout),
+            exchange_map: step!("exchange_map", &layout),
         };
         Self {
             device: device.clone(),
@@ -509,12 +513,15 @@ impl EnvMapSelector {
         run(&steps.sum_unseen, count);
         run(&steps.begin_swaps, 1);
         for _ in 0..if is_anew { MOST_SWAPS } else { 1 } {
-            run(&steps.add_for_swap, 1);
-            if !by_samples {
+            if by_samples {
+                run(&steps.try_exchanges, count);
+                run(&steps.exchange_map, 1);
+            } else {
+                run(&steps.add_for_swap, 1);
                 run(&steps.mark_newest, count);
+                run(&steps.sum_unseen, count);
+                run(&steps.drop_map, 1);
             }
-            run(&steps.sum_unseen, count);
-            run(&steps.drop_map, 1);
             run(&steps.sum_unseen, count);
         }
         run(&steps.end_steps, 1);

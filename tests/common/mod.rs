@@ -9,7 +9,7 @@ pub(crate) mod meshes;
 pub(crate) mod statistics;
 pub(crate) mod texture;
 
-pub(crate) use examples::adapter::{Gpu, Wishes};
+pub(crate) use examples::adapter::{self, Gpu, Wishes};
 pub(crate) use examples::offline::{self, Component, Offline};
 #[cfg(all(feature = "bvh", feature = "reference"))]
 pub(crate) use examples::reference::{self, Reference};

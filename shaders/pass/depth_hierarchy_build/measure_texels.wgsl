@@ -6,6 +6,7 @@
 
 @group(0) @binding(0) var env_maps: texture_2d_array<u32>;
 @group(0) @binding(1) var ranges: texture_storage_2d_array<r32uint, write>;
+@group(0) @binding(2) var<storage, read> maps: array<u32>;
 
 // A texel's plane may leave the range of its neighbours by this share.
 const BEYOND: f32 = 0.02;
@@ -53,11 +54,12 @@ fn measure_texels(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= vec2u(size)) {
         return;
     }
-    let map = id.z / 6u;
+    let map = maps[id.z / 6u];
     let face = id.z % 6u;
+    let layer = 6u * map + face;
     let surface = surface_texel_unpack(env_map_load(map, face, id.xy));
     if surface.distance <= 0.0 {
-        textureStore(ranges, id.xy, id.z, vec4u(0u));
+        textureStore(ranges, id.xy, layer, vec4u(0u));
         return;
     }
     let middle = 2.0 * (vec2f(id.xy) + 0.5) / f32(size) - 1.0;
@@ -86,5 +88,5 @@ fn measure_texels(@builtin(global_invocation_id) id: vec3u) {
     let tilt = half_texel * (abs(plane.x) + abs(plane.y));
     let limits = vec2f(seen.least * (1.0 - BEYOND), seen.greatest * (1.0 + BEYOND));
     let range = DepthRange(max(own - tilt, limits.x), min(own + tilt, limits.y));
-    textureStore(ranges, id.xy, id.z, vec4u(depth_range_pack(range, agreeing)));
+    textureStore(ranges, id.xy, layer, vec4u(depth_range_pack(range, agreeing)));
 }

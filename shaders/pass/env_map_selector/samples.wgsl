@@ -1,6 +1,8 @@
 // What candidates see of the surfaces that light reaches: samples of these are taken where photons arrived, so that the
 // outside of a building, which no light of its rooms reaches, does not count. One bit for each sample and candidate.
 
+var<workgroup> shared_bits: u32;
+
 fn samples_words() -> u32 {
     return (params.sample_count + 31u) / 32u;
 }
@@ -41,7 +43,7 @@ fn samples_seen(word: u32, maps: u32) -> vec2u {
 }
 
 // A second look at a sample counts as little as this against a first: it decides where nothing new is to be seen.
-const SAMPLES_SECOND_LOOK: f32 = 0.05;
+const SAMPLES_SECOND_LOOK: f32 = 0.002;
 
 // What a candidate's view of a word is worth beside what other maps see.
 fn samples_worth(own: u32, others: vec2u) -> f32 {
@@ -75,4 +77,73 @@ fn samples_uncovered(lane: u32) -> vec2f {
         );
     }
     return counts;
+}
+
+// Exchanges that gain less are not worth a map's moving.
+const SAMPLES_LEAST_GAIN: f32 = 0.5;
+
+// What exchanging the map of a bit for a candidate gains; all lanes must call it, with sums up to date.
+fn samples_gain(candidate: u32, bit: u32, lane: u32) -> f32 {
+    let others = selection.selected & ~(1u << bit);
+    var worth = 0.0;
+    for (var word = lane; word < samples_words(); word += LANES) {
+        worth += samples_worth(seen_by[candidate * CANDIDATE_TEXELS + word], samples_seen(word, others));
+    }
+    return sum_lanes(lane, vec2f(worth, 0.0)).x - sights[selection.chosen[bit]].own;
+}
+
+// For each candidate, what it would gain in the place of a selected map: a workgroup for each.
+@compute @workgroup_size(256)
+fn try_exchanges(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let candidate = group.x;
+    if lane == 0u {
+        // Nothing to try counts as done here.
+        is_done = selection.is_done | u32(sights[candidate].is_valid == 0u || bit_of_candidate(candidate) != NONE);
+        shared_bits = selection.selected;
+        sights[candidate].exchange = -1.0;
+    }
+    if workgroupUniformLoad(&is_done) != 0u {
+        return;
+    }
+    var best_gain = -1.0;
+    for (var left = workgroupUniformLoad(&shared_bits); left != 0u; left &= left - 1u) {
+        best_gain = max(best_gain, samples_gain(candidate, countTrailingZeros(left), lane));
+    }
+    if lane == 0u {
+        sights[candidate].exchange = best_gain;
+    }
+}
+
+// Makes the best of them; if it gains nothing, the selection is stable.
+@compute @workgroup_size(256)
+fn exchange_map(@builtin(local_invocation_index) lane: u32) {
+    var own = vec2f(-1.0, 0.0);
+    for (var i = lane; i < params.candidate_count; i += LANES) {
+        if sights[i].exchange > own.x {
+            own = vec2f(sights[i].exchange, f32(i));
+        }
+    }
+    let winner = best_of_lanes(lane, own);
+    if lane == 0u {
+        shared_bits = select(selection.selected, 0u, winner.x < SAMPLES_LEAST_GAIN || selection.is_done != 0u);
+    }
+    let candidate = u32(winner.y);
+    var best_gain = 0.0;
+    var best_bit = NONE;
+    for (var left = workgroupUniformLoad(&shared_bits); left != 0u; left &= left - 1u) {
+        let bit = countTrailingZeros(left);
+        let gain = samples_gain(candidate, bit, lane);
+        best_bit = select(best_bit, bit, gain > best_gain);
+        best_gain = max(best_gain, gain);
+    }
+    if lane != 0u || selection.is_done != 0u {
+        return;
+    }
+    if best_bit == NONE {
+        selection.is_done = 1u;
+        selection.is_stable = 1u;
+    } else {
+        selection.chosen[best_bit] = candidate;
+        selection.swaps += 1u;
+    }
 }

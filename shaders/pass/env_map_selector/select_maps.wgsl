@@ -34,7 +34,8 @@ struct Sight {
     unseen: f32,
     // Part of it that no selected map but this one sees
     own: f32,
-    pad: u32,
+    // By samples: what the best exchange of a selected map for this candidate gains
+    exchange: f32,
 }
 
 struct Selection {
@@ -155,7 +156,7 @@ fn inspect_candidates(@builtin(workgroup_id) group: vec3u, @builtin(local_invoca
         let is_outside = f32(back_faces) <= params.back_face_limit * f32(surfaces);
         let is_clear = bitcast<f32>(closest) >= params.clearance;
         let is_valid = surfaces > 0u && is_outside && is_clear;
-        sights[candidate] = Sight(surfaces, back_faces, closest, u32(is_valid), total, total, total, 0u);
+        sights[candidate] = Sight(surfaces, back_faces, closest, u32(is_valid), total, total, total, 0.0);
     }
 }
 
@@ -411,7 +412,7 @@ fn measure_coverage(@builtin(local_invocation_index) lane: u32) {
 // Until a selection arrives, maps stand at the first candidates: those at invalid ones are switched off.
 @compute @workgroup_size(64)
 fn switch_maps(@builtin(global_invocation_id) id: vec3u) {
-    if id.x < min(arrayLength(&map_centers), params.candidate_count) {
+    if id.x < min(arrayLength(&map_centers), min(params.candidate_count, params.limit)) {
         map_centers[id.x].w = f32(sights[id.x].is_valid);
     }
 }
