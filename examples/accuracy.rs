@@ -1,7 +1,7 @@
 //! Renders scenes with every preset and measures the images against references.
 //!
 //! ```text
-//! cargo run --release --example accuracy -- SCENES TRUTH [--presets fast,balanced] [--docs docs]
+//! cargo run --release --example accuracy -- SCENES TRUTH [--presets fast,balanced] [--tracers hybrid,bvh] [--docs docs]
 //! ```
 //!
 //! SCENES holds `NAME.glb` or `NAME.gltf`, TRUTH holds `NAME.COMPONENT.exr`; every reference whose scene is there is
@@ -9,8 +9,15 @@
 //! `indirect`, `all`, or `light_traced`: all light again, by a renderer that finds caustics. The preset `reference` is the
 //! path tracer, whose frames are samples a pixel.
 //!
+//! With `--tracers` every preset is rendered once with each of these tracers (`image-space`, `hybrid`, `bvh`) in place of
+//! its own, and the table names the tracer after the preset. What does not depend on it is rendered once: the component
+//! `direct`, and the preset `reference`.
+//!
 //! Each finished row is kept in the folder `--out`: a line in `rows.jsonl` and the image. Rows that are there, rendered
 //! on the same adapter, are not rendered again unless `--fresh` is given; after a change of the renderer it has to be.
+//! A row and the name of its image carry the tracer where it is not the preset's own: a row that names none serves with
+//! `--tracers` and without.
+//!
 //! The table goes to stdout and to `table.md`, a contact sheet to `sheet.png`; with `--docs` they also go to `accuracy.md`
 //! between its two markers, and to `accuracy.png`. A scene that a preset does not model in full is rendered all the same;
 //! the table says what was simplified.
@@ -40,6 +47,12 @@ use std::process::ExitCode;
 /// All presets, in the order of the table; [`render`] knows what they mean.
 const PRESETS: [&str; 4] = ["fast", "balanced", "accurate", reference::PRESET];
 
+/// The setting that says what photons are traced through.
+const TRACER_KIND: &str = "tracer.kind";
+
+/// All values of [`TRACER_KIND`], in the order of the table.
+const TRACERS: [&str; 3] = ["image-space", "hybrid", "bvh"];
+
 /// What a reference may hold, and what is rendered to compare with it.
 const COMPONENTS: [(&str, Component); 4] = [
     ("direct", Component::Direct),
@@ -64,6 +77,9 @@ struct Arguments {
     /// Only these presets (default: fast, balanced, accurate, reference)
     #[arg(long, value_delimiter = ',')]
     presets: Vec<String>,
+    /// Each preset with these tracers (image-space, hybrid, bvh) in place of its own
+    #[arg(long, value_delimiter = ',')]
+    tracers: Vec<String>,
     /// Only these scenes
     #[arg(long, value_delimiter = ',')]
     scenes: Vec<String>,
@@ -108,6 +124,7 @@ fn main() -> ExitCode {
 /// Whether every image was rendered and is finite.
 fn run(arguments: &Arguments) -> Result<bool, String> {
     let presets = presets(arguments)?;
+    let tracers = tracers(arguments)?;
     let references = references(arguments)?;
     // Before hours of rendering.
     if let Some(docs) = &arguments.docs {
@@ -121,23 +138,26 @@ fn run(arguments: &Arguments) -> Result<bool, String> {
     };
     let gpu = Gpu::open(arguments.adapter.as_deref(), wishes)?;
     let mut rows = Rows::read(&arguments.out)?;
-    let bar = progress::bar((references.len() * presets.len()) as u64);
+    let jobs: Vec<Vec<Job<'_>>> = references
+        .iter()
+        .map(|reference| jobs(arguments, reference, &presets, &tracers))
+        .collect();
+    let bar = progress::bar(jobs.iter().map(Vec::len).sum::<usize>() as u64);
     bar.set_style(ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}").map_err(|error| error.to_string())?);
     let (mut table, mut sheet) = (Vec::new(), Vec::new());
-    for reference in &references {
+    for (reference, jobs) in references.iter().zip(jobs) {
         let mut images = Vec::new();
-        for &preset in &presets {
-            let job = Job::new(arguments, reference, preset);
+        for job in jobs {
             bar.set_message(job.name());
             match finish(arguments, &gpu, &job, &mut rows, &bar) {
                 Ok((row, image)) => {
                     images.push(Labelled {
-                        label: label(preset, &row),
+                        label: label(&job, &row),
                         image,
                     });
-                    table.push(row);
+                    table.push((job.title(), row));
                 }
-                Err(problem) => table.push(job.row(json!({ "failed": problem }))),
+                Err(problem) => table.push((job.title(), job.row(json!({ "failed": problem })))),
             }
             bar.inc(1);
         }
@@ -155,7 +175,7 @@ fn run(arguments: &Arguments) -> Result<bool, String> {
         &markdown(arguments, &gpu, &table),
         &contact_sheet::png(&sheet)?,
     )?;
-    Ok(table.iter().all(|row| row["figures"]["finite"] == true))
+    Ok(table.iter().all(|(_, row)| row["figures"]["finite"] == true))
 }
 
 /// A row and its image, rendered now or before, compared and kept.
@@ -185,6 +205,15 @@ fn presets(arguments: &Arguments) -> Result<Vec<&str>, String> {
     }
     let is_wanted = |preset: &&str| arguments.presets.is_empty() || arguments.presets.iter().any(|p| p == preset);
     Ok(PRESETS.into_iter().filter(is_wanted).collect())
+}
+
+/// Entries of [`TRACERS`]; none where every preset keeps its own.
+fn tracers(arguments: &Arguments) -> Result<Vec<&'static str>, String> {
+    if let Some(unknown) = arguments.tracers.iter().find(|t| !TRACERS.contains(&t.as_str())) {
+        return Err(format!("--tracers {unknown:?}: there are {}", TRACERS.join(", ")));
+    }
+    let is_wanted = |tracer: &&str| arguments.tracers.iter().any(|t| t == tracer);
+    Ok(TRACERS.into_iter().filter(is_wanted).collect())
 }
 
 /// A file to compare with.
@@ -259,6 +288,8 @@ fn file_names(folder: &Path) -> Result<Vec<String>, String> {
 struct Job<'a> {
     reference: &'a Reference,
     preset: &'a str,
+    /// An entry of [`TRACERS`], if one was asked for and the image depends on it.
+    tracer: Option<&'static str>,
     bounces: u32,
     /// Instead of the preset's.
     frames: Option<u32>,
@@ -266,11 +297,12 @@ struct Job<'a> {
 }
 
 impl<'a> Job<'a> {
-    fn new(arguments: &Arguments, reference: &'a Reference, preset: &'a str) -> Self {
+    fn new(arguments: &Arguments, reference: &'a Reference, preset: &'a str, tracer: Option<&'static str>) -> Self {
         let image = &reference.truth.image;
         Self {
             reference,
             preset,
+            tracer,
             bounces: arguments.bounces,
             frames: arguments.frames,
             size: [image.width, image.height],
@@ -279,11 +311,25 @@ impl<'a> Job<'a> {
 
     /// Tells it from all others in a folder.
     fn name(&self) -> String {
+        let tracer = self.other_tracer().map_or(String::new(), |tracer| format!(".{tracer}"));
         let frames = self.frames.map_or(String::new(), |frames| format!(".frames{frames}"));
         format!(
-            "{}.{}.{}.bounces{}{frames}",
+            "{}.{}.{}{tracer}.bounces{}{frames}",
             self.reference.scene, self.reference.component.0, self.preset, self.bounces
         )
+    }
+
+    /// "balanced", or "balanced, hybrid" where that tracer was asked for.
+    fn title(&self) -> String {
+        let tracer = self.tracer.map_or(String::new(), |tracer| format!(", {tracer}"));
+        format!("{}{tracer}", self.preset)
+    }
+
+    /// The tracer, if it is not the preset's own.
+    fn other_tracer(&self) -> Option<&'static str> {
+        let own = Settings::preset(self.preset)?.entries();
+        self.tracer
+            .filter(|&tracer| !own.contains(&(TRACER_KIND, tracer.to_owned())))
     }
 
     /// `result` with what it is the result of.
@@ -292,10 +338,33 @@ impl<'a> Job<'a> {
         result["scene"] = json!(self.reference.scene);
         result["component"] = json!(self.reference.component.0);
         result["preset"] = json!(self.preset);
+        if let Some(tracer) = self.other_tracer() {
+            result["tracer"] = json!(tracer);
+        }
         result["bounces"] = json!(self.bounces);
         result["size"] = json!(self.size);
         result
     }
+}
+
+/// What is compared with a reference: each preset, with each tracer that was asked for if the image depends on it.
+fn jobs<'a>(
+    arguments: &Arguments,
+    reference: &'a Reference,
+    presets: &[&'a str],
+    tracers: &[&'static str],
+) -> Vec<Job<'a>> {
+    let is_direct = reference.component.1 == Component::Direct;
+    let mut jobs = Vec::new();
+    for &preset in presets {
+        if tracers.is_empty() || is_direct || preset == reference::PRESET {
+            jobs.push(Job::new(arguments, reference, preset, None));
+        } else {
+            let with = |&tracer| Job::new(arguments, reference, preset, Some(tracer));
+            jobs.extend(tracers.iter().map(with));
+        }
+    }
+    jobs
 }
 
 /// The finished rows of a folder.
@@ -408,11 +477,14 @@ fn render_frames(
     job: &Job<'_>,
     on_frame: &dyn Fn(u32, u32),
 ) -> Result<Rendering, String> {
-    let settings = Settings {
+    let mut settings = Settings {
         bounces: job.bounces,
         frames: job.frames.unwrap_or(preset.frames),
         ..preset
     };
+    if let Some(tracer) = job.tracer {
+        settings.set(TRACER_KIND, tracer).map_err(|error| error.to_string())?;
+    }
     settings.validate().map_err(|error| error.to_string())?;
     let (_, component) = job.reference.component;
     let mut offline = Offline::new(gpu, scene, &settings, 0, job.size, component).map_err(|error| error.to_string())?;
@@ -472,20 +544,21 @@ fn trace_paths(gpu: &Gpu, scene: Scene, job: &Job<'_>, on_frame: &dyn Fn(u32, u3
     })
 }
 
-/// "fast 0.0589 -9.0%"
-fn label(preset: &str, row: &Value) -> String {
-    let figures = &row["figures"];
+/// "fast 0.0589 -9.0%", or "fast, hybrid 0.0589": what there is room for on the contact sheet.
+fn label(job: &Job<'_>, row: &Value) -> String {
+    let (title, figures) = (job.title(), &row["figures"]);
     match (figures["relmse"].as_f64(), figures["bias"].as_f64()) {
-        (Some(relmse), Some(bias)) => format!("{preset} {} {:+.1}%", short(relmse), 100.0 * bias),
-        _ => format!("{preset} not finite"),
+        (Some(relmse), Some(_)) if job.tracer.is_some() => format!("{title} {}", short(relmse)),
+        (Some(relmse), Some(bias)) => format!("{title} {} {:+.1}%", short(relmse), 100.0 * bias),
+        _ => format!("{title} not finite"),
     }
 }
 
-/// The table, with what it was made with above it.
-fn markdown(arguments: &Arguments, gpu: &Gpu, rows: &[Value]) -> String {
+/// The table, with what it was made with above it. `rows` come with their [`Job::title`].
+fn markdown(arguments: &Arguments, gpu: &Gpu, rows: &[(String, Value)]) -> String {
     let mut sizes: Vec<String> = rows
         .iter()
-        .map(|row| format!("{} × {}", row["size"][0], row["size"][1]))
+        .map(|(_, row)| format!("{} × {}", row["size"][0], row["size"][1]))
         .collect();
     sizes.sort();
     sizes.dedup();
@@ -499,18 +572,18 @@ fn markdown(arguments: &Arguments, gpu: &Gpu, rows: &[Value]) -> String {
     text += "| scene | preset | frames | component | relMSE | near edges | interior | mixed | energy bias | red, green, \
         blue | RMSE | reference's noise | time per frame | simplified |\n";
     text += "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n";
-    for row in rows {
+    for (title, row) in rows {
         // Writing to a string does not fail.
-        let _ = writeln!(text, "| {} |", cells(row).join(" | "));
+        let _ = writeln!(text, "| {} |", cells(title, row).join(" | "));
     }
     text
 }
 
-fn cells(row: &Value) -> Vec<String> {
+fn cells(title: &str, row: &Value) -> Vec<String> {
     let word = |name: &str| row[name].as_str().unwrap_or_default().to_owned();
     let mut cells = vec![
         word("scene"),
-        word("preset"),
+        title.to_owned(),
         row["frames"].to_string(),
         word("component"),
     ];
@@ -568,6 +641,7 @@ fn command(arguments: &Arguments) -> String {
     let mut command = "cargo run --release --example accuracy -- SCENES TRUTH".to_owned();
     for (option, names) in [
         ("presets", &arguments.presets),
+        ("tracers", &arguments.tracers),
         ("scenes", &arguments.scenes),
         ("components", &arguments.components),
         ("unpictured", &arguments.unpictured),
