@@ -4,7 +4,7 @@
 //! cargo bench --bench image_space_tracer
 //! ```
 //!
-//! `examples/trace_study.rs` says what the time buys.
+//! `examples/trace_study/` says what the time buys.
 
 #[path = "../examples/common/mod.rs"]
 mod common;

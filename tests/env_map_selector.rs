@@ -13,7 +13,7 @@ use lightfall::pass::{
 };
 use lightfall::resource::cube_face::CUBE_FACES;
 use lightfall::resource::{CameraView, MeshGeometry};
-use lightfall::scene::{Instance, Light, Material, Mesh, Scene, SceneSummary, UnitFrame, samples};
+use lightfall::scene::{Instance, Light, LightKind, Material, Mesh, Scene, SceneSummary, UnitFrame, samples};
 use lightfall::{creation_count, read_rgba32float_blocking, wgpu};
 
 /// Texels along a face of a candidate's map.
@@ -463,6 +463,7 @@ impl<'a> Host<'a> {
             env_map_size: 32,
             shadow_map_size: 64,
             selector: EnvMapSelectorSettings {
+                candidates: 40,
                 measure,
                 ..Default::default()
             },
@@ -776,6 +777,28 @@ fn house() -> Scene {
     scene.instances.extend([shell, Instance::new(2, 0)]);
     scene.cameras = samples::furnace(0.5, 1.0).cameras;
     scene
+}
+
+#[test]
+fn by_photons_maps_follow_a_lamp_into_another_room() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::two_rooms(0.0);
+    let mut host = Host::by(&gpu, scene, CoverageMeasure::Photons, 1);
+    host.frame();
+    host.settle();
+    assert!(
+        host.centers()[0].z < 0.0,
+        "the lamp is in the near room, and the door is closed"
+    );
+    host.scene.lights[0].kind = LightKind::Point {
+        position: DVec3::new(0.8, 2.4, 2.2),
+        radius: 0.0,
+    };
+    host.frame();
+    host.settle();
+    println!("{:.2?}", host.centers());
+    assert!(host.centers()[0].z > 0.0, "now it is in the far one");
+    assert_no_errors(&gpu);
 }
 
 #[test]

@@ -19,8 +19,8 @@ use std::ops::Range;
 /// border must not restart the selection every frame.
 const REGION_SLACK: f64 = 0.1;
 
-/// How often places are selected by photons before they are maintained: first by photons that saw maps in places chosen by
-/// area, then by better ones. A third time changed no selection (`docs/tracing.md`).
+/// How often places are selected by photons before they are maintained: first by photons that were traced through maps in
+/// places chosen by area, then through better ones.
 pub(super) const PHOTON_ROUNDS: u32 = 2;
 
 /// Frames in which photons may arrive nowhere before places are left as they are.
@@ -60,6 +60,8 @@ struct OngoingSelection {
     photons_in: Option<u32>,
     /// Selections by photons that found none so far.
     failures: u32,
+    /// The last step that selected anew; what arrives of earlier ones says nothing of it.
+    awaited: u32,
     /// Whether there is anything to maintain.
     is_started: bool,
     /// Rounds of maintenance still to go; 0: at rest.
@@ -132,6 +134,14 @@ impl EnvMapPlacement {
     /// Notes that geometry is not as it was in the frame before.
     pub(super) fn geometry_changed(&mut self) {
         if let Some(ongoing) = &mut self.ongoing {
+            ongoing.geometry_changed();
+        }
+    }
+
+    /// Notes that light reaches other places than in the frame before.
+    pub(super) fn lights_changed(&mut self) {
+        if let Some(ongoing) = &mut self.ongoing {
+            ongoing.failures = 0;
             ongoing.geometry_changed();
         }
     }
@@ -294,6 +304,7 @@ impl OngoingSelection {
             photon_rounds: 0,
             photons_in: None,
             failures: 0,
+            awaited: 0,
             is_started: false,
             rounds: 0,
             part: 0,
@@ -322,7 +333,6 @@ impl OngoingSelection {
     }
 
     fn geometry_changed(&mut self) {
-        self.failures = 0;
         if !self.is_started {
             self.is_pending = true;
         } else if self.part == 0 {
@@ -364,9 +374,9 @@ impl OngoingSelection {
                 return;
             }
             SelectionStep::Select => {
-                (self.is_pending, self.is_started) = (false, true);
+                (self.is_pending, self.is_started, self.awaited) = (false, true, self.tag);
                 if lacked_photons {
-                    (self.photon_rounds, self.photons_in) = (PHOTON_ROUNDS, Some(0));
+                    (self.photon_rounds, self.photons_in) = (PHOTON_ROUNDS, None);
                 } else {
                     (self.photon_rounds, self.photons_in) = (self.photon_rounds.saturating_sub(1), None);
                 }
@@ -380,10 +390,13 @@ impl OngoingSelection {
 
     /// Comes to rest once a step has found nothing to change in the geometry as it is now.
     fn settle(&mut self, selection: &Selection) {
+        if selection.tag < self.awaited {
+            return;
+        }
         if selection.centers.is_empty() && self.failures < MOST_FAILURES {
             // No photon arrived anywhere, as when the frame that traced them was never submitted.
             self.failures += 1;
-            (self.photon_rounds, self.photons_in) = (self.photon_rounds + 1, Some(0));
+            (self.photon_rounds, self.photons_in) = (self.photon_rounds + 1, Some(1));
             return;
         }
         self.photons_in = self.photons_in.or(Some(1));

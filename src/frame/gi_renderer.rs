@@ -217,6 +217,15 @@ impl GiRenderer {
         };
         let plan = Plan::for_scene(summary, &self.settings);
         self.allocate(&plan, lights)?;
+        let reach = |lights: &[Light]| {
+            lights
+                .iter()
+                .map(|l| (l.kind, l.strength() == DVec3::ZERO))
+                .collect::<Vec<_>>()
+        };
+        if self.state.as_ref().is_some_and(|s| reach(&s.lights) != reach(lights)) {
+            self.placement.lights_changed();
+        }
         self.state = Some(SceneState {
             frame,
             plan,
@@ -390,7 +399,7 @@ impl GiRenderer {
     /// environment maps are captured that may show it; `&[]`: nowhere. Of an object that moved both its old box and its new
     /// one are wanted. It counts for the next `prepare`, adds to what was said before it, and includes
     /// [`GiRenderer::geometry_changed`] where there is a change. In frames without a word of it everything is captured. A
-    /// frame that was prepared has to be recorded and submitted, or its changes are missed.
+    /// frame that was recorded has to be submitted, or its changes are missed.
     pub fn set_changes(&mut self, changes: &[SceneBounds]) {
         self.recapture.set_changes(changes);
         if !changes.is_empty() {
@@ -424,15 +433,16 @@ impl GiRenderer {
             self.views.extend(direct.shadow_maps.views(&state.frame, &state.lights));
         }
         let maps_from = self.views.len();
-        self.env_map_layers.clear();
-        if let Some(env_maps) = self.indirect.as_ref().and_then(IndirectScene::env_maps) {
-            self.env_map_layers = self.recapture.layers(&state.frame, env_maps.centers());
+        let env_maps = self.indirect.as_ref().and_then(IndirectScene::env_maps);
+        let centers = env_maps.map_or(&[][..], EnvMaps::centers);
+        self.env_map_layers = self.recapture.layers(&state.frame, centers);
+        if let Some(env_maps) = env_maps {
             let all: Vec<_> = env_maps.views(CapturePurpose::EnvMap).collect();
             self.views
                 .extend(self.env_map_layers.iter().map(|&layer| all[layer as usize]));
         }
         let selection_from = self.views.len();
-        let has_photons = self.traced_photons().is_some();
+        let has_photons = traced_photons(&self.state, &self.photons_frame, &self.indirect).is_some();
         let work = self
             .placement
             .plan_frame(&self.settings.selector, has_photons, &mut self.views);
@@ -474,15 +484,10 @@ impl GiRenderer {
                 layers: &self.env_map_layers,
             };
             indirect.record(encoder, &self.passes.photons, &photon_inputs)?;
+            self.recapture.recorded();
             self.photons_frame = self.state.as_ref().map(|s| s.frame);
         }
         Ok(())
-    }
-
-    /// Photons of an earlier frame, if they are in the present unit frame.
-    fn traced_photons(&self) -> Option<&Photons> {
-        let (state, frame) = (self.state.as_ref()?, self.photons_frame.as_ref()?);
-        self.photons().filter(|_| frame.maps_like(&state.frame))
     }
 
     #[cfg(feature = "bvh")]
@@ -531,6 +536,7 @@ impl GiRenderer {
             return;
         };
         let env_maps = self.indirect.as_ref().and_then(IndirectScene::env_maps);
+        let photons = traced_photons(&self.state, &self.photons_frame, &self.indirect);
         if let (Some(state), Some(env_maps)) = (&self.state, env_maps) {
             let placement_inputs = PlacementInputs {
                 context: &selection_context(&self.device, inputs.queue, &self.settings, state),
@@ -538,11 +544,7 @@ impl GiRenderer {
                 work: &work,
                 views: &self.views[views],
                 env_maps,
-                photons: self
-                    .photons_frame
-                    .filter(|frame| frame.maps_like(&state.frame))
-                    .and(self.indirect.as_ref())
-                    .map(|i| &i.photons),
+                photons,
                 timestamps: inputs.timestamps,
             };
             self.placement
@@ -865,6 +867,16 @@ fn selection_context<'a>(
         settings: &settings.selector,
         limit: settings.env_map_count,
     }
+}
+
+/// Photons of an earlier frame, if they are in the present unit frame.
+fn traced_photons<'a>(
+    state: &Option<SceneState>,
+    traced_in: &Option<UnitFrame>,
+    indirect: &'a Option<IndirectScene>,
+) -> Option<&'a Photons> {
+    let (state, frame, indirect) = (state.as_ref()?, traced_in.as_ref()?, indirect.as_ref()?);
+    frame.maps_like(&state.frame).then_some(&indirect.photons)
 }
 
 /// Gives every view its position in the list.

@@ -64,7 +64,7 @@ impl PhotonPasses {
         let (kind, method) = (settings.tracer_kind, settings.trace_method);
         Self {
             env_map_capture: EnvMapCapture::new(),
-            depth_hierarchy_build: needs_hierarchy(settings).then(|| DepthHierarchyBuild::new(device)),
+            depth_hierarchy_build: settings.needs_hierarchy().then(|| DepthHierarchyBuild::new(device)),
             photon_emitter: PhotonEmitter::new(device),
             image_space_tracer: kind.uses_env_maps().then(|| ImageSpaceTracer::new(device, method)),
             #[cfg(feature = "bvh")]
@@ -92,7 +92,7 @@ impl IndirectScene {
                 ))
             };
             Ok(ImageSpaceScene {
-                hierarchy: needs_hierarchy(settings).then(hierarchy).transpose()?,
+                hierarchy: settings.needs_hierarchy().then(hierarchy).transpose()?,
                 env_maps,
                 capture: EnvMapCaptureResources::new(device, settings.env_map_size)?,
                 tracer: ImageSpaceTracerResources::for_shared_hops(device, shared_hops)?,
@@ -240,9 +240,4 @@ impl IndirectScene {
         list.push(("uniforms", uniforms));
         list
     }
-}
-
-/// Whether rays step over depth hierarchies.
-fn needs_hierarchy(settings: &Settings) -> bool {
-    settings.tracer_kind.uses_env_maps() && settings.trace_method.needs_hierarchy()
 }

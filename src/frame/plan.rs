@@ -22,6 +22,8 @@ pub enum Stage {
     EnvMapSelector,
     /// What is around a few points.
     EnvMapCapture,
+    /// How deep the surfaces in it lie, coarsely.
+    DepthHierarchyBuild,
     /// Photons from lights.
     PhotonEmitter,
     /// Photons from surface to surface, as environment maps see them.
@@ -90,7 +92,7 @@ impl Plan {
             PenumbraSearch::On => soft.clone(),
             PenumbraSearch::Off => (false, "settings search no occluders".to_owned()),
         };
-        let [selection, maps] = map_stages(&indirect, settings);
+        let [selection, maps, hierarchies] = map_stages(&indirect, settings);
         let [image_space, bvh] = tracers(&indirect, settings);
         let upsampling = upsampling(&indirect, settings);
         Self {
@@ -102,6 +104,7 @@ impl Plan {
                 stage(Stage::DirectLight, lit),
                 stage(Stage::EnvMapSelector, selection),
                 stage(Stage::EnvMapCapture, maps),
+                stage(Stage::DepthHierarchyBuild, hierarchies),
                 stage(Stage::PhotonEmitter, indirect.clone()),
                 stage(Stage::ImageSpaceTracer, image_space),
                 stage(Stage::BvhTracer, bvh),
@@ -144,21 +147,29 @@ fn indirect(summary: &SceneSummary, settings: &Settings) -> (bool, String) {
     }
 }
 
-/// The selection of places for environment maps, and their capture.
-fn map_stages(indirect: &(bool, String), settings: &Settings) -> [(bool, String); 2] {
+/// The selection of places for environment maps, their capture, and their depth hierarchies.
+fn map_stages(indirect: &(bool, String), settings: &Settings) -> [(bool, String); 3] {
     if !indirect.0 {
-        return [indirect.clone(), indirect.clone()];
+        return [(); 3].map(|()| indirect.clone());
     }
     if !settings.tracer_kind.uses_env_maps() {
-        return ["rays meet triangles"; 2].map(|reason| (false, reason.to_owned()));
+        return ["rays meet triangles"; 3].map(|reason| (false, reason.to_owned()));
     }
     let (most, size) = (settings.env_map_count, settings.env_map_size);
     let candidates = settings.selector.candidates.max(most);
+    let all = match settings.env_maps_at_lights {
+        0 => format!("at most {most} maps of 6 × {size}²"),
+        extra => format!("at most {most} maps of 6 × {size}², and {extra} at lights"),
+    };
+    let hierarchies = match settings.needs_hierarchy() {
+        true => (true, "rays step over empty space".to_owned()),
+        false => (false, "settings walk over none".to_owned()),
+    };
     [
-        format!("of {candidates} candidates, and while geometry changes"),
-        format!("at most {most} maps of 6 × {size}²"),
+        (true, format!("of {candidates} candidates, and while geometry changes")),
+        (true, all),
+        hierarchies,
     ]
-    .map(|reason| (true, reason))
 }
 
 /// The tracer in image space, and that of triangles.
@@ -170,7 +181,7 @@ fn tracers(indirect: &(bool, String), settings: &Settings) -> [(bool, String); 2
     let [image_space, bvh] = match settings.tracer_kind {
         TracerKind::ImageSpace => [(true, all), (false, "settings trace in image space")],
         TracerKind::Bvh => [(false, "settings trace triangles"), (true, all)],
-        TracerKind::Hybrid => [(true, all), (true, "rays that ImageSpaceTracer loses")],
+        TracerKind::Hybrid => [(true, all), (true, "rays that ImageSpaceTracer is not sure of")],
     };
     [image_space, bvh].map(|(on, reason)| (on, reason.to_owned()))
 }
@@ -290,15 +301,16 @@ mod tests {
             let stages = [
                 Stage::EnvMapSelector,
                 Stage::EnvMapCapture,
+                Stage::DepthHierarchyBuild,
                 Stage::ImageSpaceTracer,
                 Stage::BvhTracer,
             ];
             stages.map(|stage| plan.is_on(stage))
         };
-        assert_eq!(on(TracerKind::ImageSpace, 1), [true, true, true, false]);
-        assert_eq!(on(TracerKind::Bvh, 1), [false, false, false, true]);
-        assert_eq!(on(TracerKind::Hybrid, 1), [true; 4]);
-        assert_eq!(on(TracerKind::Hybrid, 0), [false; 4]);
+        assert_eq!(on(TracerKind::ImageSpace, 1), [true, true, true, true, false]);
+        assert_eq!(on(TracerKind::Bvh, 1), [false, false, false, false, true]);
+        assert_eq!(on(TracerKind::Hybrid, 1), [true; 5]);
+        assert_eq!(on(TracerKind::Hybrid, 0), [false; 5]);
     }
 
     #[test]

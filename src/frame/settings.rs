@@ -23,7 +23,7 @@ pub enum TracerKind {
     /// The triangles of a `BvhGeometry`, which the host brings. No ray is lost, and no environment map is needed; geometry
     /// that is not in the trees does not take part. Feature `bvh`.
     Bvh,
-    /// Environment maps, and triangles for the rays that these lose. Feature `bvh`.
+    /// Environment maps, and triangles for the rays that these lose or are not sure of. Feature `bvh`.
     Hybrid,
 }
 
@@ -97,9 +97,11 @@ impl Settings {
             env_map_size: 64,
             shadow_map_size: 256,
             selector: EnvMapSelectorSettings {
+                candidates: 40,
                 coverage_target: 0.99,
                 ..Default::default()
             },
+            trace_method: TraceMethod::OrderedMarch,
             subsampling: Subsampling::Quarter,
             tracer: ImageSpaceTracerSettings {
                 iterations: 5,
@@ -144,6 +146,7 @@ impl Settings {
                 coverage_target: 1.0,
                 ..Default::default()
             },
+            trace_method: TraceMethod::VerifiedWalk,
             soft_shadow: SoftShadowSettings::accurate(),
             subsampling: Subsampling::Full,
             splatter: PhotonSplatterSettings {
@@ -200,6 +203,11 @@ impl Settings {
             Some(knob) => Err(knob.error(&(knob.get)(self))),
             None => Ok(()),
         }
+    }
+
+    /// Whether rays step over depth hierarchies.
+    pub(super) fn needs_hierarchy(&self) -> bool {
+        self.tracer_kind.uses_env_maps() && self.trace_method.needs_hierarchy()
     }
 
     fn density(&mut self) -> (&mut f32, &mut [f32; 2]) {

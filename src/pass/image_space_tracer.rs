@@ -48,7 +48,7 @@ pub(crate) const LIST_SLOTS: [Slot; 4] = [Slot::Uniform, Slot::Storage, Slot::St
 
 /// How a ray is searched for in the maps.
 ///
-/// The first four ask every map and take the nearest surface that any of them shows. The others ask the maps in order of
+/// The first four take the nearest surface that any map shows. The others ask the maps in order of
 /// distance, each continuing where the one before knew no further, and tell a hit that is certain from one that is
 /// tentative, because something unseen may lie before it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -101,7 +101,7 @@ pub struct ImageSpaceTracerSettings {
     pub iterations: u32,
     /// Fetches after which a walk over hierarchies gives a ray up as lost, for a surer tracer to find; 0: never.
     pub most_fetches: u32,
-    /// Whether walks over hierarchies call a hit tentative where neighbouring texels face different ways, so that the facet
+    /// Whether ordered walks call a hit tentative where neighbouring texels face different ways, so that the facet
     /// that is hit may be another. A surer tracer then finds the right normal of nearly all; it has more to do.
     pub doubts_normals: bool,
     /// Scatterings before Russian roulette may end a path. Lower is faster and noisier.

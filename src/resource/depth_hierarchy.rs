@@ -9,8 +9,8 @@ pub(crate) const RANGE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uin
 /// For every face of a set of [`EnvMaps`], the least and greatest inverse depth in squares of 1, 2, 4, ... texels: what a
 /// ray needs to step over empty space. `r32uint`, layers as in the maps, mip l holds squares of 2^l texels; a side that is
 /// no power of two is rounded up to one, and the cells beyond it say that nothing is there. Depth is the distance along the
-/// face's axis, unit frame. Two numbers of 14 bits a cell, and on the finest mip four bits that say where a texel's
-/// neighbours show the same surface.
+/// face's axis, unit frame. Two numbers of 13 bits a cell, and on the finest mip five bits that say where a texel's
+/// neighbours show the same surface (`docs/conventions.md`).
 #[derive(Debug)]
 pub struct DepthHierarchy {
     view: wgpu::TextureView,
@@ -33,7 +33,7 @@ impl DepthHierarchy {
         (spec, side.ilog2() + 1)
     }
 
-    /// Bytes for `capacity` maps of `size`² texels a face: a third of the maps' own.
+    /// Bytes for `capacity` maps of `size`² texels a face: a third of the maps' own where the side is a power of two.
     pub fn size_in_bytes(capacity: u32, size: u32) -> u64 {
         let (spec, levels) = Self::spec(capacity, size);
         gpu::mip_bytes(&spec, levels)

@@ -22,7 +22,7 @@ const HEADER_BYTES: u64 = std::mem::offset_of!(gpu::LostRays, paths) as u64;
 /// Paths that a shader lists together. Twin of `BLOCK` in `shaders/pass/image_space_tracer/list_lost.wgsl`.
 pub(crate) const BLOCK: u32 = 64;
 
-/// A list of paths on the GPU, of one hop at a time: those that a tracer lost, in ascending order, so that the list is the
+/// A list of paths on the GPU, of one hop at a time: those that a tracer lost or is not sure of, in ascending order, so that the list is the
 /// same every time.
 ///
 /// A storage buffer, also `COPY_SRC` and `COPY_DST`: the three workgroup counts of an indirect dispatch with an invocation

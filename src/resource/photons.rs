@@ -48,8 +48,7 @@ pub enum PhotonState {
 impl Photon {
     /// Bit of `state` that marks a photon straight from its light.
     pub const FIRST_HIT: u32 = 256;
-    /// Bit of `state` that marks a hop of which the tracer is not sure: a surer one should walk it again. No tracer of this
-    /// crate sets it yet.
+    /// Bit of `state` that marks a hop of which the tracer is not sure: a surer one should walk it again.
     pub const TENTATIVE: u32 = 512;
 
     /// What became of this hop.

@@ -47,7 +47,7 @@ pub enum SurfaceHitKind {
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct SurfaceHit {
-    /// From the ray's position, unit frame; 0 if it meets nothing.
+    /// From 2^-12 above the ray's position, where it starts, unit frame; 0 if it meets nothing.
     pub distance: f32,
     /// A [`SurfaceHitKind`] as a number, from 1 in the order Surface, Escaped, Lost, Tentative.
     pub kind: u32,

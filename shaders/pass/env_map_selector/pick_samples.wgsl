@@ -10,9 +10,12 @@ fn pick_samples(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let slots = arrayLength(&photons);
-    let run = max(slots / count, 1u);
+    // All slots are in a run: the first so many runs are longer by one.
+    let longer = slots % count;
+    let first = id.x * (slots / count) + min(id.x, longer);
+    let end = first + slots / count + u32(id.x < longer);
     var found = SurfaceSample(vec3f(2.0 * SURFACE_SAMPLE_NOWHERE), 0u);
-    for (var slot = id.x * run; slot < min((id.x + 1u) * run, slots); slot++) {
+    for (var slot = first; slot < end; slot++) {
         if (photons[slot].state & PHOTON_STATE_MASK) == PHOTON_STORED {
             found = SurfaceSample(photons[slot].position, photons[slot].normal);
             break;

@@ -1,8 +1,6 @@
 // What candidates see of the surfaces that light reaches: samples of these are taken where photons arrived, so that the
 // outside of a building, which no light of its rooms reaches, does not count. One bit for each sample and candidate.
 
-var<workgroup> shared_bits: u32;
-
 fn samples_words() -> u32 {
     return (params.sample_count + 31u) / 32u;
 }

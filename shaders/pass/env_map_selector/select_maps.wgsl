@@ -62,7 +62,7 @@ struct Selection {
 // candidate, one bit for each sample that it sees
 @group(0) @binding(4) var<storage, read_write> seen_by: array<u32>;
 @group(0) @binding(5) var<storage, read_write> selection: Selection;
-@group(0) @binding(6) var<storage, read_write> samples: array<SurfaceSample>;
+@group(0) @binding(6) var<storage, read> samples: array<SurfaceSample>;
 // Centres of environment maps in use, w: 1 on, 0 off
 @group(1) @binding(0) var<storage, read_write> map_centers: array<vec4f>;
 
@@ -74,6 +74,7 @@ var<workgroup> nearest: atomic<u32>;
 var<workgroup> sums: array<vec2f, LANES>;
 var<workgroup> best: array<vec2f, LANES>;
 var<workgroup> is_done: u32;
+var<workgroup> shared_bits: u32;
 
 fn bit_of_candidate(candidate: u32) -> u32 {
     for (var bit = 0u; bit < 32u; bit++) {

@@ -129,6 +129,8 @@ fn hierarchy_map(map: u32, x: vec3f, r: vec3f, start: f32, end: f32, starts_in_f
     // Of the texel walked through last, h = x + t y; nothing crosses this one
     var last_plane = vec2f(0.0);
     var last_surface: SurfaceTexel;
+    var last_cell = vec2i(0);
+    var last_bits = 0u;
     // While the ray is behind: h where it left the last texel
     var behind = HIERARCHY_THICKNESS;
     let first = x + start * r;
@@ -184,7 +186,7 @@ fn hierarchy_map(map: u32, x: vec3f, r: vec3f, start: f32, end: f32, starts_in_f
                     }
                     if last_plane.y > 0.0 && last_meets - t <= crack {
                         result.hit = hierarchy_hit(last_surface, x, r, max(last_meets, t));
-                        return hierarchy_crossing(result, is_certain, ray, cell, bits, start);
+                        return hierarchy_crossing(result, is_certain, ray, last_cell, last_bits, start);
                     }
                     // A plane that the ray rises from, and the texel that it starts in, are the surface it has left.
                     let rises = plane.y <= 0.0 && meets - t <= crack;
@@ -211,6 +213,8 @@ fn hierarchy_map(map: u32, x: vec3f, r: vec3f, start: f32, end: f32, starts_in_f
                 behind = 1.0 - height.y;
                 last_plane = plane;
                 last_surface = surface;
+                last_cell = cell;
+                last_bits = bits;
             }
             if !in_front && range.least * min(z.x, z.y) >= HIERARCHY_THICKNESS {
                 behind = HIERARCHY_THICKNESS;
@@ -242,7 +246,7 @@ fn hierarchy_map(map: u32, x: vec3f, r: vec3f, start: f32, end: f32, starts_in_f
         t = max(t, face_end);
         face = exit.face;
     }
-    if is_certain {
+    if is_certain && t >= end {
         result.kind = HIT_ESCAPED;
         result.free = end;
     }

@@ -43,7 +43,7 @@ fn march_map(map: u32, x: vec3f, r: vec3f, start: f32, end: f32, starts_in_front
     let aside = max(length(x + closest * r), MARCH_CLOSEST);
     let first_angle = atan((start - closest) / aside);
     let last_angle = atan((end - closest) / aside);
-    let steps = u32(ceil((last_angle - first_angle) / MARCH_STEP));
+    let steps = u32(max(ceil((last_angle - first_angle) / MARCH_STEP), 0.0));
     var result = MapTrace(HIT_LOST, start, hit_nothing(HIT_LOST));
     var is_certain = starts_in_front;
     var in_front = starts_in_front;

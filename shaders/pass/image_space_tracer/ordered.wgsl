@@ -138,6 +138,11 @@ fn ordered_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
             }
         }
     }
+    // What a ray must have met is only known of one that set out where a map looks: others may never have come there, like
+    // those from the outside of a building that is seen from within.
+    if tentative.kind == HIT_TENTATIVE && !is_known {
+        return hit_nothing(HIT_LOST);
+    }
     if tentative.kind == HIT_SURFACE {
         tentative.kind = HIT_TENTATIVE;
     }

@@ -23,7 +23,7 @@ struct Params {
 @group(1) @binding(3) var depth_ranges: texture_2d_array<u32>;
 
 // Twin of `TraceMethod`.
-override method: u32 = 4u;
+override method: u32 = 5u;
 
 const METHOD_PAPER: u32 = 0u;
 const METHOD_PLANE: u32 = 1u;
@@ -127,6 +127,9 @@ fn trace_map(map: u32, x: vec3f, r: vec3f, start: f32, end: f32, starts_in_front
 }
 
 fn trace_ray(position: vec3f, normal: vec3f, r: vec3f) -> Hit {
+    env_map_fetches = 0u;
+    trace_maps = 0u;
+    trace_steps = 0u;
     let origin = position + TRACE_OFFSET * normal;
     switch method {
         case METHOD_PAPER, METHOD_PLANE: {
