@@ -15,6 +15,7 @@ mod common;
 use clap::Parser;
 use common::adapter::{Gpu, Wishes};
 use common::clock::Clock;
+use common::sequence::Sequence;
 use common::{arguments, named_scene};
 use lightfall::glam::{DAffine3, DVec3, UVec2, Vec3, Vec3A};
 use lightfall::pass::{BvhTracer, BvhTracerRayInputs, BvhTracerResources, RayQuery};
@@ -26,7 +27,6 @@ use obvhs::cwbvh::node::CwBvhNode;
 use obvhs::rt_triangle::RtTriangle;
 use obvhs::triangle::Triangle;
 use obvhs::{BvhBuildParams, traverse};
-use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
 
 /// Bytes that the GPU reads of a node, and of a triangle to test it.
@@ -265,23 +265,6 @@ fn bounce(scene: &Scene, frame: &UnitFrame, ray: &Ray, hit: &RayHit, random: &mu
     let point = a + v * (b - a) + w * (c - a) + OFFSET * side;
     // The sum of a normal and a point of the unit sphere is distributed by the cosine.
     leaving(point.as_vec3(), (side + random.direction()).normalize_or(side))
-}
-
-/// Points of a low-discrepancy sequence (Roberts 2018): additive, by the powers of the plastic number's inverse.
-#[derive(Default)]
-struct Sequence(u64);
-
-impl Sequence {
-    /// Uniform on the sphere.
-    fn direction(&mut self) -> DVec3 {
-        const PLASTIC: f64 = 1.324_717_957_244_746;
-        self.0 += 1;
-        let [u, v] = [1, 2].map(|k| (0.5 + self.0 as f64 / PLASTIC.powi(k)).fract());
-        let z = 1.0 - 2.0 * u;
-        let (sin, cos) = (TAU * v).sin_cos();
-        let r = (1.0 - z * z).max(0.0).sqrt();
-        DVec3::new(r * cos, r * sin, z)
-    }
 }
 
 /// All triangles of a scene as one mesh, in its unit frame.

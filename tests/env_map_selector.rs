@@ -3,6 +3,7 @@
 
 mod common;
 
+use common::meshes::room;
 use common::statistics::Random;
 use common::{Gpu, assert_no_errors, gpu};
 use lightfall::frame::{GiRenderer, SceneInputs, Settings, ViewInputs, ViewResources};
@@ -13,30 +14,11 @@ use lightfall::pass::{
 };
 use lightfall::resource::cube_face::CUBE_FACES;
 use lightfall::resource::{CameraView, MeshGeometry};
-use lightfall::scene::{Instance, Light, LightKind, Material, Mesh, Scene, SceneSummary, UnitFrame, samples};
+use lightfall::scene::{Instance, Light, LightKind, Mesh, Scene, SceneSummary, UnitFrame, samples};
 use lightfall::{creation_count, read_rgba32float_blocking, wgpu};
 
 /// Texels along a face of a candidate's map.
 const SIZE: u32 = 32;
-
-/// A closed box of these half extents around the origin, seen from inside.
-fn room(half: DVec3) -> Scene {
-    let mut mesh = Mesh::default();
-    for face in CUBE_FACES {
-        let at = |s: f32, t: f32| (half.as_vec3() * (face.forward + s * face.right + t * face.up)).to_array();
-        let first = mesh.positions.len() as u32;
-        mesh.positions
-            .extend([at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)]);
-        mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|i| first + i));
-    }
-    Scene {
-        meshes: vec![mesh],
-        materials: vec![Material::diffuse("white", [0.7; 3])],
-        instances: vec![Instance::new(0, 0)],
-        lights: vec![Light::point(DVec3::ZERO, 1.0, [1.0; 3])],
-        ..Scene::default()
-    }
-}
 
 /// A scene, ready for selections among candidates of the test's choice.
 struct Bench<'a> {
@@ -763,14 +745,16 @@ fn house() -> Scene {
     for triangle in outside.indices.chunks_exact_mut(3) {
         triangle.swap(0, 1);
     }
-    let mut ground = Mesh::default();
-    ground.positions = vec![
-        [-3.0, -1.1, 3.0],
-        [3.0, -1.1, 3.0],
-        [3.0, -1.1, -3.0],
-        [-3.0, -1.1, -3.0],
-    ];
-    ground.indices = vec![0, 1, 2, 0, 2, 3];
+    let ground = Mesh {
+        positions: vec![
+            [-3.0, -1.1, 3.0],
+            [3.0, -1.1, 3.0],
+            [3.0, -1.1, -3.0],
+            [-3.0, -1.1, -3.0],
+        ],
+        indices: vec![0, 1, 2, 0, 2, 3],
+        ..Mesh::default()
+    };
     scene.meshes.extend([outside, ground]);
     let mut shell = Instance::new(1, 0);
     shell.transform = DAffine3::from_scale(DVec3::splat(1.05));

@@ -12,6 +12,7 @@ mod bench;
 mod judge;
 
 use bench::{Bench, Maps};
+use common::meshes::room;
 use common::statistics::Random;
 use common::{Gpu, assert_no_errors, gpu};
 use judge::{Verdict, judge, unpack};
@@ -23,7 +24,7 @@ use lightfall::pass::{
 };
 use lightfall::resource::cube_face::CUBE_FACES;
 use lightfall::resource::{EnvMaps, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, SurfaceRays};
-use lightfall::scene::{Instance, Light, Material, Mesh, Scene, SceneSummary, samples};
+use lightfall::scene::{SceneSummary, samples};
 
 /// Methods that say whether they are certain.
 const ORDERED: [TraceMethod; 3] = [
@@ -31,25 +32,6 @@ const ORDERED: [TraceMethod; 3] = [
     TraceMethod::OrderedWalk,
     TraceMethod::VerifiedWalk,
 ];
-
-/// A closed cube of half extent 1, seen from inside.
-fn cube() -> Scene {
-    let mut mesh = Mesh::default();
-    for face in CUBE_FACES {
-        let at = |s: f32, t: f32| (face.forward + s * face.right + t * face.up).to_array();
-        let first = mesh.positions.len() as u32;
-        mesh.positions
-            .extend([at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)]);
-        mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|i| first + i));
-    }
-    Scene {
-        meshes: vec![mesh],
-        materials: vec![Material::diffuse("white", [0.7; 3])],
-        instances: vec![Instance::new(0, 0)],
-        lights: vec![Light::point(DVec3::ZERO, 1.0, [1.0; 3])],
-        ..Scene::default()
-    }
-}
 
 fn trace(bench: &Bench<'_>, method: TraceMethod, maps: &Maps, rays: &[SurfaceRay]) -> Vec<SurfaceHit> {
     let tracer = ImageSpaceTracer::new(&bench.gpu.device, method);
@@ -90,7 +72,7 @@ fn directions(count: usize) -> impl Iterator<Item = Vec3> {
 #[test]
 fn what_one_map_sees_whole_is_traced_exactly() {
     let Some(gpu) = gpu() else { return };
-    let mut bench = Bench::new(&gpu, cube()).unwrap();
+    let mut bench = Bench::new(&gpu, room(DVec3::ONE)).unwrap();
     let half = bench.frame.point(DVec3::ONE).x;
     // The middle, anywhere, near a wall; sides that are no power of two. Along a wall that a map stands
     // close to, and in the cube's own edges, one texel shows one wall where another begins: some of what goes there is lost.
@@ -133,7 +115,7 @@ fn what_one_map_sees_whole_is_traced_exactly() {
 #[test]
 fn rays_along_axes_edges_and_through_centres_arrive() {
     let Some(gpu) = gpu() else { return };
-    let mut bench = Bench::new(&gpu, cube()).unwrap();
+    let mut bench = Bench::new(&gpu, room(DVec3::ONE)).unwrap();
     let half = bench.frame.point(DVec3::ONE).x;
     let mut special = Vec::new();
     for face in CUBE_FACES {

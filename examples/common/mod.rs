@@ -20,5 +20,6 @@ pub(crate) mod progress;
 pub(crate) mod reference;
 #[cfg(feature = "reference")]
 pub(crate) mod report;
+pub(crate) mod sequence;
 #[cfg(feature = "reference")]
 pub(crate) mod truth_file;

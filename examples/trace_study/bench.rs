@@ -1,6 +1,7 @@
 //! A scene on the GPU: its rays, what they truly meet, environment maps of it, and the tracers.
 
 use super::common::adapter::Gpu;
+use super::common::sequence::Sequence;
 use super::judge::Truth;
 use lightfall::frame::{GiRenderer, SceneInputs, Settings, TracerKind};
 use lightfall::glam::{DVec3, Vec3};
@@ -15,7 +16,6 @@ use lightfall::resource::{
 };
 use lightfall::scene::{Scene, SceneSummary, UnitFrame};
 use lightfall::{Error, wgpu};
-use std::f64::consts::TAU;
 
 /// Rays leave a surface from this far above it, unit frame: as the tracers do.
 const OFFSET: f32 = 1.0 / 4096.0;
@@ -290,22 +290,5 @@ impl<'a> Bench<'a> {
         let mut hits: Vec<SurfaceHit> = lightfall::read_buffer_blocking(device, queue, list.hits())?;
         hits.truncate(rays.len());
         Ok((hits, ms))
-    }
-}
-
-/// Points of a low-discrepancy sequence (Roberts 2018): additive, by the powers of the plastic number's inverse.
-#[derive(Default)]
-pub(crate) struct Sequence(u64);
-
-impl Sequence {
-    /// Uniform on the sphere.
-    pub(crate) fn direction(&mut self) -> DVec3 {
-        const PLASTIC: f64 = 1.324_717_957_244_746;
-        self.0 += 1;
-        let [u, v] = [1, 2].map(|k| (0.5 + self.0 as f64 / PLASTIC.powi(k)).fract());
-        let z = 1.0 - 2.0 * u;
-        let (sin, cos) = (TAU * v).sin_cos();
-        let r = (1.0 - z * z).max(0.0).sqrt();
-        DVec3::new(r * cos, r * sin, z)
     }
 }

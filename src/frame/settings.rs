@@ -133,8 +133,8 @@ impl Settings {
         }
     }
 
-    /// Accumulates frames; narrower kernels, finer maps, and as many as there may be: a second look at what one map sees
-    /// takes a third of the error that is left (`docs/accuracy.md`).
+    /// Accumulates frames; narrower kernels, finer maps, and as many as there may be: what one map sees from afar another may
+    /// see from nearer.
     pub fn accurate() -> Self {
         Self {
             frames: 64,

@@ -154,8 +154,7 @@ pub struct EnvMapSelectorSettings {
 }
 
 impl Default for EnvMapSelectorSettings {
-    /// A convex room gets one map and a Cornell box eight, whose indirect light has four fifths of the squared error
-    /// that the three maps of a target of 0.99 leave (`docs/accuracy.md`).
+    /// A convex room gets one map and a Cornell box three or four.
     fn default() -> Self {
         Self {
             candidates: 100,

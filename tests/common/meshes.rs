@@ -2,7 +2,8 @@
 
 use super::statistics::Random;
 use lightfall::glam::{DVec3, Vec3};
-use lightfall::scene::Mesh;
+use lightfall::resource::cube_face::CUBE_FACES;
+use lightfall::scene::{Instance, Light, Material, Mesh, Scene};
 use std::f64::consts::{PI, TAU};
 
 /// A mesh of these triangles, each with corners of its own, as meshes have whose normals or texture coordinates are
@@ -171,4 +172,23 @@ pub(crate) fn slivers(count: u32, seed: u64) -> Mesh {
         })
         .collect();
     soup("slivers", triangles)
+}
+
+/// A closed box of these half extents around the origin, seen from inside.
+pub(crate) fn room(half: DVec3) -> Scene {
+    let mut mesh = Mesh::default();
+    for face in CUBE_FACES {
+        let at = |s: f32, t: f32| (half.as_vec3() * (face.forward + s * face.right + t * face.up)).to_array();
+        let first = mesh.positions.len() as u32;
+        mesh.positions
+            .extend([at(-1.0, -1.0), at(1.0, -1.0), at(1.0, 1.0), at(-1.0, 1.0)]);
+        mesh.indices.extend([0, 1, 2, 0, 2, 3].map(|i| first + i));
+    }
+    Scene {
+        meshes: vec![mesh],
+        materials: vec![Material::diffuse("white", [0.7; 3])],
+        instances: vec![Instance::new(0, 0)],
+        lights: vec![Light::point(DVec3::ZERO, 1.0, [1.0; 3])],
+        ..Scene::default()
+    }
 }

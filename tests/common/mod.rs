@@ -13,7 +13,7 @@ pub(crate) use examples::adapter::{self, Gpu, Wishes};
 pub(crate) use examples::offline::{self, Component, Offline};
 #[cfg(all(feature = "bvh", feature = "reference"))]
 pub(crate) use examples::reference::{self, Reference};
-pub(crate) use examples::{exr_file, gltf_scene, truth_file};
+pub(crate) use examples::{exr_file, gltf_scene, sequence, truth_file};
 
 /// A device, or `None` with a printed reason where the machine has no usable adapter; a failure where
 /// `LIGHTFALL_REQUIRE_GPU=1` says that there must be one.
