@@ -446,6 +446,7 @@ impl<'a> Host<'a> {
             shadow_map_size: 64,
             selector: EnvMapSelectorSettings {
                 candidates: 40,
+                coverage_target: 0.999,
                 measure,
                 ..Default::default()
             },
