@@ -18,6 +18,10 @@ fn small() -> Settings {
         env_map_count: 3,
         env_map_size: 32,
         shadow_map_size: 64,
+        selector: EnvMapSelectorSettings {
+            candidates: 40,
+            ..Default::default()
+        },
         subsampling: Subsampling::Full,
         ..Settings::balanced()
     }
