@@ -734,7 +734,8 @@ impl GiRenderer {
         self.indirect.as_ref().and_then(IndirectScene::depth_hierarchy)
     }
 
-    /// Share of what valid candidates for environment maps see that the maps in use see; `None` until a selection has arrived, and for maps placed by hand.
+    /// Share of what valid candidates for environment maps see that the maps in use see; `None` until a selection has
+    /// arrived, and for maps placed by hand.
     pub fn env_map_coverage(&self) -> Option<f32> {
         self.placement.coverage()
     }

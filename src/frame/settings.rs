@@ -53,7 +53,7 @@ pub struct Settings {
     /// captures each.
     pub env_map_count: u32,
     /// Further environment maps at the first so many point and spot lights, 0 to 8: what light from there meets next is seen
-    /// from where it comes. Each costs as much as any other map (`docs/tracing.md`).
+    /// from where it comes. Each costs as much as any other map.
     pub env_maps_at_lights: u32,
     /// Texels along a face of an environment map. Finer resolves thinner things and costs memory and capture time as the
     /// square.

@@ -136,8 +136,7 @@ pub enum CoverageMeasure {
 /// What to try, what to accept, and when enough is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnvMapSelectorSettings {
-    /// Candidates, up to 512. More find better places and cost six coarse captures each, and 150 kB. Photons leave fewer of
-    /// them out of account than area does, and of a hundred the best eight see half a percent more than of forty.
+    /// Candidates, up to 512. More find better places and cost six coarse captures each, and 150 kB.
     pub candidates: u32,
     /// A candidate that sees more than this share of back faces stands inside a solid.
     pub back_face_limit: f32,
