@@ -453,7 +453,7 @@ fn report(
         .map(|(bounce, hop): (u32, _)| {
             json!({
                 "bounce": bounce, "in": watts(hop.emitted), "absorbed": watts(hop.absorbed),
-                "stored": watts(hop.stored), "escaped": watts(hop.escaped), "lost": watts(hop.lost),
+                "stored": watts(hop.stored), "tentative": watts(hop.tentative), "escaped": watts(hop.escaped), "lost": watts(hop.lost),
             })
         })
         .collect();

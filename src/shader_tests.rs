@@ -312,7 +312,7 @@ fn twins() -> Vec<Twin> {
             tag, selected, newest, is_done, is_stable, swaps, coverage, pad, chosen,
         }),
         twin!(wgsl::TRACE_STATISTICS, "Params", trace_statistics::gpu::Params { photon_count }),
-        twin!(wgsl::TRACE_STATISTICS, "Sums", trace_statistics::gpu::Sums { stored, absorbed, escaped, lost }),
+        twin!(wgsl::TRACE_STATISTICS, "Sums", trace_statistics::gpu::Sums { stored, tentative, absorbed, escaped, lost }),
     ]
 }
 

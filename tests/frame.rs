@@ -289,7 +289,7 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
         maps: None,
         timestamps,
     };
-    let mut build = DepthHierarchyBuildResources::new(device).unwrap();
+    let mut build = DepthHierarchyBuildResources::new(device, &env_maps).unwrap();
     DepthHierarchyBuild::new(device).record(&mut encoder, &mut build, &build_inputs);
     let maps = (&env_maps, Some(&hierarchy));
     walk_by_hand(&mut encoder, (device, queue), settings, maps, (&bvh, &photons));

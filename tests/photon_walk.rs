@@ -92,7 +92,7 @@ impl<'a> World<'a> {
             timestamps: None,
         };
         submit(self.gpu, |encoder| {
-            let mut build = DepthHierarchyBuildResources::new(device).unwrap();
+            let mut build = DepthHierarchyBuildResources::new(device, env_maps).unwrap();
             DepthHierarchyBuild::new(device).record(encoder, &mut build, &build_inputs);
             self.image_space_tracer
                 .record(encoder, &mut resources, &inputs)

@@ -216,7 +216,7 @@ impl<'a> Bench<'a> {
         let mut views: Vec<_> = maps.views(CapturePurpose::EnvMap).collect();
         self.prepare(&mut views)?;
         let mut capture = EnvMapCaptureResources::new(device, size)?;
-        let mut build = DepthHierarchyBuildResources::new(device)?;
+        let mut build = DepthHierarchyBuildResources::new(device, &maps)?;
         let capture_inputs = EnvMapCaptureInputs {
             env_maps: &maps,
             geometry: &self.geometry,

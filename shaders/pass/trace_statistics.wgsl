@@ -7,6 +7,7 @@ struct Params {
 struct Sums {
     // rgb: flux; a: records
     stored: vec4f,
+    tentative: vec4f,
     absorbed: vec4f,
     escaped: vec4f,
     lost: vec4f,
@@ -29,6 +30,7 @@ fn sum_hops(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
         switch photon.state & PHOTON_STATE_MASK {
             case PHOTON_STORED: {
                 sums.stored += flux;
+                sums.tentative += select(vec4f(0.0), flux, photon_is_unresolved(photon.state));
                 sums.absorbed += vec4f(photon.flux * (1.0 - reflectance_unpack(photon.reflectance)), 1.0);
             }
             case PHOTON_ESCAPED: { sums.escaped += flux; }
@@ -42,6 +44,7 @@ fn sum_hops(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
         if lane < half {
             let other = lane_sums[lane + half];
             lane_sums[lane].stored += other.stored;
+            lane_sums[lane].tentative += other.tentative;
             lane_sums[lane].absorbed += other.absorbed;
             lane_sums[lane].escaped += other.escaped;
             lane_sums[lane].lost += other.lost;

@@ -88,7 +88,7 @@ impl IndirectScene {
             let hierarchy = || {
                 Ok((
                     DepthHierarchy::new(device, &env_maps)?,
-                    DepthHierarchyBuildResources::new(device)?,
+                    DepthHierarchyBuildResources::new(device, &env_maps)?,
                 ))
             };
             Ok(ImageSpaceScene {

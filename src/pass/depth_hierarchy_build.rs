@@ -11,9 +11,6 @@ use crate::{Error, Timestamps, wgsl};
 /// Bindings of both shaders in `shaders/pass/depth_hierarchy_build/`, in order.
 pub(crate) const SLOTS: [Slot; 3] = [Slot::UintArray, Slot::StorageArray(RANGE_FORMAT), Slot::Storage];
 
-/// More maps than fit the layers of a texture array under default limits.
-const MOST_MAPS: usize = 64;
-
 /// Invocations along a side of a workgroup.
 const GROUP: u32 = 8;
 
@@ -42,7 +39,7 @@ pub struct DepthHierarchyBuildInputs<'a> {
     pub env_maps: &'a EnvMaps,
     /// Written; made for these maps.
     pub hierarchy: &'a DepthHierarchy,
-    /// Maps that were captured since; `None`: all that are in use.
+    /// Maps that were captured since, those that are not in use left out; `None`: all that are in use.
     pub maps: Option<&'a [u32]>,
     /// Sink for GPU time.
     pub timestamps: Option<&'a Timestamps>,
@@ -89,15 +86,17 @@ impl DepthHierarchyBuild {
         resources: &mut DepthHierarchyBuildResources,
         inputs: &DepthHierarchyBuildInputs<'_>,
     ) {
-        let in_use: Vec<u32> = (0..inputs.env_maps.centers().len() as u32).collect();
-        let maps = inputs.maps.unwrap_or(&in_use);
-        let maps = &maps[..maps.len().min(MOST_MAPS)];
+        let room = resources.maps.size() / size_of::<u32>() as u64;
+        let in_use = (inputs.env_maps.centers().len() as u64).min(room) as u32;
+        let maps: Vec<u32> = (0..in_use)
+            .filter(|map| inputs.maps.is_none_or(|maps| maps.contains(map)))
+            .collect();
         if maps.is_empty() {
             return;
         }
         inputs
             .queue
-            .write_buffer(&resources.maps, 0, bytemuck::cast_slice(maps));
+            .write_buffer(&resources.maps, 0, bytemuck::cast_slice(&maps));
         let label = "lightfall::DepthHierarchyBuild";
         let levels = inputs.hierarchy.levels();
         let sources = std::iter::once(inputs.env_maps.view()).chain(levels);
@@ -119,15 +118,15 @@ impl DepthHierarchyBuild {
 }
 
 impl DepthHierarchyBuildResources {
-    /// For one set of maps.
+    /// For these maps.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] if the device grants next to nothing.
-    pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
+    pub fn new(device: &wgpu::Device, env_maps: &EnvMaps) -> Result<Self, Error> {
         /// Levels of the largest maps that there can be.
         const LEVELS: usize = 16;
         use wgpu::BufferUsages as U;
-        let bytes = MOST_MAPS as u64 * size_of::<u32>() as u64;
+        let bytes = u64::from(env_maps.capacity()) * size_of::<u32>() as u64;
         let label = "lightfall::DepthHierarchyBuild::maps";
         Ok(Self {
             maps: device::buffer(device, label, bytes, U::STORAGE | U::COPY_DST)?,

@@ -1,6 +1,6 @@
 //! The energy audit: emitted = absorbed + stored and continuing + escaped + lost, hop by hop.
 //!
-//! Input: [`Photons`]. Output: four sums a hop, read back by the host. Cost: one read of the photon buffer; meant for
+//! Input: [`Photons`]. Output: five sums a hop, read back by the host. Cost: one read of the photon buffer; meant for
 //! measuring, not for every frame.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
@@ -22,6 +22,7 @@ pub(crate) mod gpu {
     #[repr(C)]
     pub(crate) struct Sums {
         pub(crate) stored: [f32; 4],
+        pub(crate) tentative: [f32; 4],
         pub(crate) absorbed: [f32; 4],
         pub(crate) escaped: [f32; 4],
         pub(crate) lost: [f32; 4],
@@ -40,6 +41,8 @@ pub struct HopStatistics {
     pub emitted: [f32; 3],
     /// Flux that arrived at a surface.
     pub stored: [f32; 3],
+    /// Part of `stored` of which the tracer is not sure ([`Photon::TENTATIVE`](crate::resource::Photon::TENTATIVE)).
+    pub tentative: [f32; 3],
     /// Part of `stored` that the surface keeps.
     pub absorbed: [f32; 3],
     /// Flux that left the scene.
@@ -165,6 +168,7 @@ fn hop(sums: &gpu::Sums) -> HopStatistics {
         stored_count: sums.stored[3] as u64,
         emitted: [0, 1, 2].map(|c| sums.stored[c] + sums.escaped[c] + sums.lost[c]),
         stored: rgb(sums.stored),
+        tentative: rgb(sums.tentative),
         absorbed: rgb(sums.absorbed),
         escaped: rgb(sums.escaped),
         lost: rgb(sums.lost),

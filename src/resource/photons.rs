@@ -140,7 +140,8 @@ impl Photons {
         })
     }
 
-    /// Around a host's own buffer of records.
+    /// Around a host's own buffer of records. What the buffer holds behind them must be zeros: `EnvMapSelector` takes its
+    /// samples from the whole of it.
     ///
     /// # Errors
     /// [`Error::CountMismatch`] if it is too small, [`Error::IncompatibleView`] without storage usage.
