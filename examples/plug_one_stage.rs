@@ -140,7 +140,7 @@ impl IndirectLight {
         let upsampling = match subsampling {
             Subsampling::Full => None,
             _ => Some(Upsampling {
-                coarse: Irradiance::new(device, estimated, config.format())?,
+                coarse: Irradiance::new(device, estimated, wgpu::TextureFormat::Rgba32Float)?,
                 upsampler: Upsampler::new(device),
                 resources: UpsamplerResources::new(device)?,
             }),
@@ -148,7 +148,7 @@ impl IndirectLight {
         Ok(Self {
             area: frame.area(engine.world.area()),
             frame,
-            irradiance: Irradiance::new(device, size, config.format())?,
+            irradiance: Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?,
             splatter: PhotonSplatter::new(device, &config)?,
             splatter_resources: PhotonSplatterResources::new(device, &config, &photons, estimated)?,
             subsampling,

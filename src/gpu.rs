@@ -441,6 +441,7 @@ pub(crate) struct RenderSpec<'a> {
     pub(crate) constants: &'a [(&'a str, f64)],
     pub(crate) buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
     pub(crate) topology: wgpu::PrimitiveTopology,
+    pub(crate) cull_mode: Option<wgpu::Face>,
     pub(crate) targets: &'a [Option<wgpu::ColorTargetState>],
     pub(crate) depth_stencil: Option<wgpu::DepthStencilState>,
 }
@@ -463,6 +464,7 @@ pub(crate) fn render_pipeline(device: &wgpu::Device, spec: &RenderSpec<'_>) -> w
         },
         primitive: wgpu::PrimitiveState {
             topology: spec.topology,
+            cull_mode: spec.cull_mode,
             ..Default::default()
         },
         depth_stencil: spec.depth_stencil.clone(),

@@ -2,6 +2,7 @@
 //! bindings match bind group layouts, and nothing needs more than the default limits.
 
 use crate::gpu::Slot;
+use crate::pass::photon_splatter::{raster, sort, tiled};
 use crate::pass::{
     accumulator, composite, depth_hierarchy_build, direct_light, env_map_selector, image_space_tracer,
     nearest_occluder, photon_emitter, photon_splatter, photon_walk, soft_shadow, tone_map, trace_statistics, upsampler,
@@ -277,16 +278,20 @@ fn twins() -> Vec<Twin> {
         #[cfg(all(feature = "bvh", feature = "reference"))]
         twin!(wgsl::PATH_TRACER_RESOLVE, "Params", path_tracer::gpu::ResolveParams { width, output_scale }),
         twin!(wgsl::PHOTON_SPLATTER_TILED, "Bandwidth", photon_splatter::gpu::Bandwidth {
-            scale, uniform_density, lowest, highest,
+            scale, lowest, highest, uniform_density, uniform_count, rule, max_radius, factor,
         }),
-        twin!(wgsl::PHOTON_SPLATTER_TILED, "Params", photon_splatter::gpu::TiledParams {
-            bandwidth, first_slot, slot_count, tile_columns, tile_rows, row, max_radius, capacity, factor,
+        twin!(wgsl::PHOTON_SPLATTER_RECEIVERS, "ReceiverParams", photon_splatter::gpu::ReceiverParams { factor }),
+        twin!(wgsl::PHOTON_SPLATTER_TILED, "TiledParams", tiled::gpu::TiledParams {
+            bandwidth, first_slot, slot_count, row,
         }),
-        twin!(wgsl::PHOTON_SPLATTER_TILED, "Splat", photon_splatter::gpu::Splat { position, radius, flux, normal }),
-        twin!(wgsl::PHOTON_SPLATTER_TILED, "Tile", photon_splatter::gpu::Tile { count, first, filled, brightest }),
-        twin!(wgsl::PHOTON_SPLATTER_QUADS, "Params", photon_splatter::gpu::QuadParams {
-            bandwidth, clip_scale, clip_shift, first_slot, max_radius, factor, _pad,
+        twin!(wgsl::PHOTON_SPLATTER_TILED, "Splat", tiled::gpu::Splat {
+            position, inverse_radius_squared, strength, normal,
         }),
+        twin!(wgsl::PHOTON_SPLATTER_SORT, "SortParams", sort::gpu::SortParams { count, blocks, shift, row }),
+        twin!(wgsl::PHOTON_SPLATTER_QUADS, "RasterParams", raster::gpu::RasterParams {
+            bandwidth, clip_scale, clip_shift, first_slot, slot_count, row, _pad,
+        }),
+        twin!(wgsl::PHOTON_SPLATTER_FINISH, "FinishParams", photon_splatter::gpu::FinishParams { factor, is_corrected }),
         twin!(wgsl::UPSAMPLER, "Params", upsampler::gpu::Params { factor, normal_agreement, plane_distance }),
         twin!(wgsl::DIRECT_LIGHT, "Params", direct_light::gpu::Params { light_count, shadow_map_size }),
         twin!(wgsl::NEAREST_OCCLUDER, "Params", nearest_occluder::gpu::Params {
@@ -415,8 +420,13 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "BvhTracer" => vec![&photon_walk::SLOTS, &bvh_geometry::BVH_SLOTS, &bvh_tracer::LOST_SLOTS],
         #[cfg(feature = "bvh")]
         "BvhTracer rays" => vec![&bvh_tracer::RAY_SLOTS, &bvh_geometry::BVH_SLOTS],
-        "PhotonSplatter tiled" => vec![&photon_splatter::TILED_SLOTS],
-        "PhotonSplatter quads" => vec![&photon_splatter::QUAD_SLOTS],
+        "PhotonSplatter receivers" => vec![&photon_splatter::RECEIVER_SLOTS],
+        "PhotonSplatter tiled" => vec![&tiled::TILED_SLOTS],
+        "PhotonSplatter sort" => vec![&sort::SORT_SLOTS],
+        "PhotonSplatter gather" => vec![&tiled::GATHER_SLOTS],
+        "PhotonSplatter bins" => vec![&raster::BIN_SLOTS],
+        "PhotonSplatter quads" | "PhotonSplatter volumes" => vec![&raster::RASTER_SLOTS],
+        "PhotonSplatter finish" => vec![&photon_splatter::FINISH_SLOTS],
         "DirectLight" => vec![&direct_light::SLOTS, &direct_light::VISIBILITY_SLOTS],
         "NearestOccluder" => vec![&nearest_occluder::SLOTS],
         "SoftShadow test" => vec![&soft_shadow::TEST_SLOTS],
@@ -701,11 +711,12 @@ fn kinds_of_hits_are_the_same_on_both_sides() {
 }
 
 #[test]
-fn tiles_are_the_same_on_both_sides() {
-    use photon_splatter::{TILE, TILES_A_SIDE};
-    let shader = Shader::new("PhotonSplatter tiled", wgsl::PHOTON_SPLATTER_TILED);
+fn bins_are_the_same_on_both_sides() {
+    use photon_splatter::{BIN, BORDER, tiled::TILE};
+    let shader = Shader::new("PhotonSplatter gather", wgsl::PHOTON_SPLATTER_GATHER);
     assert_eq!(shader.constant("TILE"), Literal::U32(TILE));
-    assert_eq!(shader.constant("TILES_A_SIDE"), Literal::I32(TILES_A_SIDE as i32));
+    assert_eq!(shader.constant("BIN"), Literal::U32(BIN));
+    assert_eq!(shader.constant("BORDER"), Literal::U32(BORDER));
 }
 
 #[test]

@@ -132,9 +132,42 @@ pub(crate) const BVH_TRACER_RAYS: &str = compose![
     "common/octahedral.wgsl",
 ];
 
+pub(crate) const PHOTON_SPLATTER_RECEIVERS: &str = compose![
+    "pass/photon_splatter/find_receivers.wgsl",
+    "pass/photon_splatter/receiver.wgsl",
+    "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
+    "common/octahedral.wgsl",
+];
+
 pub(crate) const PHOTON_SPLATTER_TILED: &str = compose![
     "pass/photon_splatter/tiled.wgsl",
+    "pass/photon_splatter/tiled_splat.wgsl",
+    "pass/photon_splatter/bandwidth.wgsl",
+    "pass/photon_splatter/bins.wgsl",
+    "common/photon.wgsl",
+    "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
+    "common/octahedral.wgsl",
+];
+
+pub(crate) const PHOTON_SPLATTER_SORT: &str = compose!["pass/photon_splatter/sort.wgsl"];
+
+pub(crate) const PHOTON_SPLATTER_GATHER: &str = compose![
+    "pass/photon_splatter/gather_tiled.wgsl",
+    "pass/photon_splatter/tiled_splat.wgsl",
+    "pass/photon_splatter/bins.wgsl",
     "pass/photon_splatter/splat.wgsl",
+    "pass/photon_splatter/receiver.wgsl",
+    "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
+    "common/octahedral.wgsl",
+];
+
+pub(crate) const PHOTON_SPLATTER_BINS: &str = compose![
+    "pass/photon_splatter/count_bins.wgsl",
+    "pass/photon_splatter/raster_params.wgsl",
+    "pass/photon_splatter/bins.wgsl",
     "common/photon.wgsl",
     "common/g_buffer.wgsl",
     "common/subsampling.wgsl",
@@ -143,8 +176,38 @@ pub(crate) const PHOTON_SPLATTER_TILED: &str = compose![
 
 pub(crate) const PHOTON_SPLATTER_QUADS: &str = compose![
     "pass/photon_splatter/quads.wgsl",
+    "pass/photon_splatter/raster.wgsl",
+    "pass/photon_splatter/raster_params.wgsl",
     "pass/photon_splatter/splat.wgsl",
+    "pass/photon_splatter/bandwidth.wgsl",
+    "pass/photon_splatter/bins.wgsl",
+    "pass/photon_splatter/receiver.wgsl",
     "common/photon.wgsl",
+    "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
+    "common/octahedral.wgsl",
+    "common/sampling.wgsl",
+];
+
+pub(crate) const PHOTON_SPLATTER_VOLUMES: &str = compose![
+    "pass/photon_splatter/volumes.wgsl",
+    "pass/photon_splatter/raster.wgsl",
+    "pass/photon_splatter/raster_params.wgsl",
+    "pass/photon_splatter/splat.wgsl",
+    "pass/photon_splatter/bandwidth.wgsl",
+    "pass/photon_splatter/bins.wgsl",
+    "pass/photon_splatter/receiver.wgsl",
+    "common/photon.wgsl",
+    "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
+    "common/octahedral.wgsl",
+    "common/sampling.wgsl",
+];
+
+pub(crate) const PHOTON_SPLATTER_FINISH: &str = compose![
+    "pass/photon_splatter/finish.wgsl",
+    "pass/photon_splatter/splat.wgsl",
+    "pass/photon_splatter/receiver.wgsl",
     "common/g_buffer.wgsl",
     "common/subsampling.wgsl",
     "common/octahedral.wgsl",
@@ -298,8 +361,14 @@ pub const MODULES: &[(&str, &str)] = &[
     ("BvhTracer", BVH_TRACER),
     #[cfg(feature = "bvh")]
     ("BvhTracer rays", BVH_TRACER_RAYS),
+    ("PhotonSplatter receivers", PHOTON_SPLATTER_RECEIVERS),
     ("PhotonSplatter tiled", PHOTON_SPLATTER_TILED),
+    ("PhotonSplatter sort", PHOTON_SPLATTER_SORT),
+    ("PhotonSplatter gather", PHOTON_SPLATTER_GATHER),
+    ("PhotonSplatter bins", PHOTON_SPLATTER_BINS),
     ("PhotonSplatter quads", PHOTON_SPLATTER_QUADS),
+    ("PhotonSplatter volumes", PHOTON_SPLATTER_VOLUMES),
+    ("PhotonSplatter finish", PHOTON_SPLATTER_FINISH),
     ("Upsampler", UPSAMPLER),
     ("DirectLight", DIRECT_LIGHT),
     ("NearestOccluder", NEAREST_OCCLUDER),

@@ -231,7 +231,7 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
     let irradiance = || Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float).unwrap();
     let (direct, indirect) = (irradiance(), irradiance());
     let estimated = settings.subsampling.size(size);
-    let coarse = Irradiance::new(device, estimated, settings.splatter_config.format()).unwrap();
+    let coarse = Irradiance::new(device, estimated, wgpu::TextureFormat::Rgba32Float).unwrap();
     let radiance = Radiance::new(device, size).unwrap();
 
     let mut camera = CameraView::new(&frame, &scene.cameras[0], size, [0.0; 2]);

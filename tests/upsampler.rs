@@ -456,9 +456,15 @@ fn geometric_normal(picture: &Picture, pixel: [u32; 2]) -> DVec3 {
                 neighbours.extend(picture.at(at).map(|(q, _)| sign * (q - p)));
             }
         }
-        neighbours
-            .into_iter()
-            .reduce(|a, b| if b.length_squared() < a.length_squared() { b } else { a })
+        let on_surface = |v: &DVec3| v.dot(shading).abs() <= 0.02 * v.length();
+        neighbours.into_iter().reduce(|a, b| {
+            let second = match (on_surface(&a), on_surface(&b)) {
+                (true, false) => false,
+                (false, true) => true,
+                _ => b.length_squared() < a.length_squared(),
+            };
+            if second { b } else { a }
+        })
     };
     let (Some(x), Some(y)) = (tangent(0), tangent(1)) else {
         return shading;
@@ -828,7 +834,7 @@ fn splat(
     let size = subsampling.size(picture.size);
     let pass = PhotonSplatter::new(&gpu.device, &config).unwrap();
     let mut resources = PhotonSplatterResources::new(&gpu.device, &config, photons, size).unwrap();
-    let target = Irradiance::new(&gpu.device, size, config.format()).unwrap();
+    let target = Irradiance::new(&gpu.device, size, wgpu::TextureFormat::Rgba32Float).unwrap();
     let settings = PhotonSplatterSettings {
         bandwidth: Bandwidth::Fixed(0.04),
         ..Default::default()

@@ -29,15 +29,27 @@ struct Neighbours {
     below: vec3f,
 }
 
-// Geometric normal at a pixel: from depth where the nearer neighbours lie on one surface, else the shading normal.
+// Sine of the largest angle between the shading normal's plane and a neighbour that lies on the pixel's surface for sure.
+const G_BUFFER_ON_SURFACE: f32 = 0.02;
+
+// Of two neighbours along an axis, by what leads from one pixel to the next: whether the second is to be taken. Across a
+// crease seen at a grazing angle the nearer one need not be the one on the surface.
+fn g_buffer_takes_second(first: vec3f, second: vec3f, shading: vec3f) -> bool {
+    let lengths = vec2f(dot(first, first), dot(second, second));
+    let heights = vec2f(dot(first, shading), dot(second, shading));
+    let on_surface = heights * heights <= G_BUFFER_ON_SURFACE * G_BUFFER_ON_SURFACE * lengths;
+    return select(lengths.y < lengths.x, on_surface.y, on_surface.x != on_surface.y);
+}
+
+// Geometric normal at a pixel: from depth where its neighbours lie on one surface, else the shading normal.
 fn g_buffer_geometric_normal(view: View, pixel: vec2i, p: vec3f, around: Neighbours, shading: vec3f) -> vec3f {
     let limit = vec2i(view.size) - 1;
     let x0 = p - around.left;
     let x1 = around.right - p;
     let y0 = p - around.above;
     let y1 = around.below - p;
-    let use_x1 = pixel.x == 0 || (pixel.x < limit.x && dot(x1, x1) < dot(x0, x0));
-    let use_y1 = pixel.y == 0 || (pixel.y < limit.y && dot(y1, y1) < dot(y0, y0));
+    let use_x1 = pixel.x == 0 || (pixel.x < limit.x && g_buffer_takes_second(x0, x1, shading));
+    let use_y1 = pixel.y == 0 || (pixel.y < limit.y && g_buffer_takes_second(y0, y1, shading));
     let n = cross(select(x0, x1, use_x1), select(y0, y1, use_y1));
     let length_squared = dot(n, n);
     let unit = n * inverseSqrt(max(length_squared, 0x1p-126));

@@ -782,7 +782,7 @@ impl IndirectView {
     fn new(device: &wgpu::Device, settings: &Settings, photons: &Photons, size: [u32; 2]) -> Result<Self, Error> {
         let config = &settings.splatter_config;
         let estimated = settings.subsampling.size(size);
-        let splatted = Irradiance::new(device, estimated, config.format())?;
+        let splatted = Irradiance::new(device, estimated, wgpu::TextureFormat::Rgba32Float)?;
         let splatter = PhotonSplatterResources::new(device, config, photons, estimated)?;
         let (irradiance, coarse) = if settings.subsampling == Subsampling::Full {
             (splatted, None)

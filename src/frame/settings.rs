@@ -2,9 +2,9 @@
 
 use crate::Error;
 use crate::pass::{
-    Bandwidth, CoverageMeasure, EnvMapSelectorResources, EnvMapSelectorSettings, ImageSpaceTracerSettings, Kernel,
-    LARGEST_RADIUS, MAX_SELECTED, MAX_TAPS, PenumbraSearch, PhotonSplatterConfig, PhotonSplatterSettings,
-    SoftShadowSettings, SplatShape, TraceMethod, UpsamplerSettings,
+    Bandwidth, BoundaryCorrection, CoverageMeasure, EnvMapSelectorResources, EnvMapSelectorSettings,
+    ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS, MAX_SELECTED, MAX_TAPS, PenumbraSearch, PhotonSplatterConfig,
+    PhotonSplatterSettings, SoftShadowSettings, SplatShape, TraceMethod, UpsamplerSettings,
 };
 use crate::resource::Subsampling;
 
@@ -215,7 +215,7 @@ impl Settings {
             self.splatter.bandwidth = PhotonSplatterSettings::default().bandwidth;
         }
         match &mut self.splatter.bandwidth {
-            Bandwidth::Density { photons, clamp } => (photons, clamp),
+            Bandwidth::Density { photons, clamp } | Bandwidth::Screen { photons, clamp } => (photons, clamp),
             Bandwidth::Fixed(_) => unreachable!("replaced above"),
         }
     }
@@ -223,7 +223,7 @@ impl Settings {
     /// k and clamp of the density bandwidth; zeros while the bandwidth is fixed.
     fn density_values(&self) -> (f32, [f32; 2]) {
         match self.splatter.bandwidth {
-            Bandwidth::Density { photons, clamp } => (photons, clamp),
+            Bandwidth::Density { photons, clamp } | Bandwidth::Screen { photons, clamp } => (photons, clamp),
             Bandwidth::Fixed(_) => (0.0, [0.0; 2]),
         }
     }
@@ -381,14 +381,15 @@ const KNOBS: &[Knob] = &[
     field!("tracer.roulette_from", "1 or more", tracer.roulette_from, |v| v >= 1),
     choice!(
         "splatter.shape",
-        "tiled or quads",
+        "tiled, quads or volumes",
         splatter_config.shape,
         ["tiled", SplatShape::Tiled],
-        ["quads", SplatShape::Quads]
+        ["quads", SplatShape::Quads],
+        ["volumes", SplatShape::Volumes]
     ),
     choice!(
         "splatter.blend_format",
-        "default, rgba16float or rgba32float (quads only)",
+        "default, rgba16float or rgba32float (quads and volumes only)",
         splatter_config.blend_format,
         ["default", None],
         ["rgba16float", Some(wgpu::TextureFormat::Rgba16Float)],
@@ -437,11 +438,29 @@ const KNOBS: &[Knob] = &[
         },
     },
     Knob {
+        name: "splatter.density",
+        expected: "hop or screen",
+        get: |s| match s.splatter.bandwidth {
+            Bandwidth::Screen { .. } => "screen".into(),
+            _ => "hop".into(),
+        },
+        set: |s, v| {
+            let (&mut photons, &mut clamp) = s.density();
+            s.splatter.bandwidth = match v {
+                "hop" => Bandwidth::Density { photons, clamp },
+                "screen" => Bandwidth::Screen { photons, clamp },
+                _ => return None,
+            };
+            Some(())
+        },
+        is_valid: |_| true,
+    },
+    Knob {
         name: "splatter.fixed_radius",
         expected: "above 0: share of the region's radius (0: by density)",
         get: |s| match s.splatter.bandwidth {
             Bandwidth::Fixed(share) => share.to_string(),
-            Bandwidth::Density { .. } => "0".into(),
+            _ => "0".into(),
         },
         set: |s, v| {
             let share: f32 = v.parse().ok()?;
@@ -454,7 +473,7 @@ const KNOBS: &[Knob] = &[
         },
         is_valid: |s| match s.splatter.bandwidth {
             Bandwidth::Fixed(share) => share > 0.0 && share.is_finite(),
-            Bandwidth::Density { .. } => true,
+            _ => true,
         },
     },
     field!(
@@ -462,6 +481,13 @@ const KNOBS: &[Knob] = &[
         "above 0, up to 23 pixels",
         splatter.max_radius,
         |v| v > 0.0 && v <= LARGEST_RADIUS
+    ),
+    choice!(
+        "splatter.boundary",
+        "off or kernel-area",
+        splatter.boundary,
+        ["off", BoundaryCorrection::Off],
+        ["kernel-area", BoundaryCorrection::KernelArea]
     ),
     choice!(
         "splatter.subsampling",

@@ -786,6 +786,7 @@ fn clear_pipeline(device: &wgpu::Device) -> wgpu::RenderPipeline {
             constants: &[],
             buffers: &[],
             topology: wgpu::PrimitiveTopology::TriangleList,
+            cull_mode: None,
             targets: &[Some(SURFACE_FORMAT.into())],
             depth_stencil: Some(wgpu::DepthStencilState {
                 depth_compare: Some(wgpu::CompareFunction::Always),

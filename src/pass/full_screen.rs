@@ -39,6 +39,7 @@ impl FullScreen {
                 constants: &[],
                 buffers: &[],
                 topology: wgpu::PrimitiveTopology::TriangleList,
+                cull_mode: None,
                 targets: &targets,
                 depth_stencil: None,
             },

@@ -197,6 +197,7 @@ impl PathTracer {
                 constants: &[],
                 buffers: &[],
                 topology: wgpu::PrimitiveTopology::TriangleList,
+                cull_mode: None,
                 targets: &[Some(wgpu::TextureFormat::Rgba32Float.into())],
                 depth_stencil: None,
             },

@@ -413,6 +413,7 @@ fn pipeline(
                 attributes: &VERTEX_ATTRIBUTES,
             })],
             topology: wgpu::PrimitiveTopology::TriangleList,
+            cull_mode: None,
             targets: &colors,
             depth_stencil: Some(targets.depth_stencil()),
         },

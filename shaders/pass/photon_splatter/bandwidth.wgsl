@@ -1,0 +1,42 @@
+// How wide a photon's kernel is. The shape brings `bin_count(bin) -> u32`.
+
+// Photons per area in the bins around a photon, by the area that the bins cover on its plane.
+fn bin_density(b: Bandwidth, photon: Photon) -> f32 {
+    let grid = bin_grid(b);
+    let bin = bin_of(b, photon.position);
+    if bin >= grid.x * grid.y {
+        return 0.0;
+    }
+    let at = vec2i(vec2u(bin % grid.x, bin / grid.x));
+    let first = max(at - 1, vec2i(0));
+    let last = min(at + 1, vec2i(grid) - 1);
+    var count = 0u;
+    for (var y = first.y; y <= last.y; y++) {
+        for (var x = first.x; x <= last.x; x++) {
+            count += bin_count(u32(y) * grid.x + u32(x));
+        }
+    }
+    let pixels = f32(BIN * b.factor) * vec2f(last - first + 1);
+    let w = dot(matrix_row(3u), vec4f(photon.position, 1.0));
+    let side = w / pixels_a_length();
+    let to_eye = normalize(view.eye.xyz - view.eye.w * photon.position);
+    let cosine = max(abs(dot(to_eye, octahedral_unpack(photon.normal))), 0.05);
+    return f32(count) * cosine / (pixels.x * pixels.y * side * side);
+}
+
+// Radius of a photon's kernel, unit frame (Yao et al. 2010, section 6, made dimensionless by area and pdf); 0 where nothing
+// is to be drawn.
+fn splat_radius(b: Bandwidth, photon: Photon) -> f32 {
+    if (photon.state & (PHOTON_STATE_MASK | PHOTON_FIRST_HIT)) != PHOTON_STORED {
+        return 0.0;
+    }
+    var h = b.scale;
+    if b.rule == BANDWIDTH_DENSITY {
+        h *= inverseSqrt(clamp(photon.density / b.uniform_density, b.lowest, b.highest));
+    } else if b.rule == BANDWIDTH_BIN {
+        h *= inverseSqrt(clamp(bin_density(b, photon) / b.uniform_count, b.lowest, b.highest));
+    }
+    let w = dot(matrix_row(3u), vec4f(photon.position, 1.0));
+    h = min(h, max(0.0, b.max_radius * w / pixels_a_length()));
+    return select(0.0, h, h > 0.0);
+}

@@ -1,0 +1,67 @@
+// The bins of the screen that photons are counted in, and the uniform that says how wide their kernels are.
+
+struct Bandwidth {
+    // h = scale / sqrt(p), p the density over the uniform one, clamped to [lowest, highest]
+    scale: f32,
+    lowest: f32,
+    highest: f32,
+    // Of one photon of a hop, per area; of all photons
+    uniform_density: f32,
+    uniform_count: f32,
+    // BANDWIDTH_...
+    rule: u32,
+    // Largest radius in pixels of the G-buffer
+    max_radius: f32,
+    // Pixels of the G-buffer for each one of the irradiance, along each axis
+    factor: u32,
+}
+
+const BANDWIDTH_FIXED: u32 = 0u;
+const BANDWIDTH_DENSITY: u32 = 1u;
+const BANDWIDTH_BIN: u32 = 2u;
+
+// Pixels of the irradiance along a bin's side. Twin of `BIN`.
+const BIN: u32 = 4u;
+// Bins beyond the rim on each side: photons out there reach in. Twin of `BORDER`.
+const BORDER: u32 = 6u;
+
+fn matrix_row(i: u32) -> vec4f {
+    let m = view.view_projection;
+    return vec4f(m[0][i], m[1][i], m[2][i], m[3][i]);
+}
+
+fn bin_grid(b: Bandwidth) -> vec2u {
+    return (subsampling_size(view.size, b.factor) + BIN - 1u) / BIN + 2u * BORDER;
+}
+
+// Of the irradiance's pixels: where normalised device coordinates lie among them. The centre of pixel i, i + 1/2, is that of
+// pixel factor i + factor / 2, rounded down, of the G-buffer.
+fn irradiance_point(b: Bandwidth, ndc: vec2f) -> vec2f {
+    let factor = f32(b.factor);
+    let shift = f32(b.factor / 2u) + 0.5 - 0.5 * factor;
+    return (vec2f(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y) * vec2f(view.size) - shift) / factor;
+}
+
+// The bin of a point of space; the number of bins where it is in none.
+fn bin_of(b: Bandwidth, p: vec3f) -> u32 {
+    let grid = bin_grid(b);
+    let w = dot(matrix_row(3u), vec4f(p, 1.0));
+    if !(w > 0.0) {
+        return grid.x * grid.y;
+    }
+    let ndc = vec2f(dot(matrix_row(0u), vec4f(p, 1.0)), dot(matrix_row(1u), vec4f(p, 1.0))) / w;
+    let bin = floor(irradiance_point(b, ndc) / f32(BIN)) + f32(BORDER);
+    if !(all(bin >= vec2f(0.0)) && all(bin < vec2f(grid))) {
+        return grid.x * grid.y;
+    }
+    let at = vec2u(bin);
+    return at.y * grid.x + at.x;
+}
+
+// Pixels of the G-buffer that a unit of length at w = 1 covers.
+fn pixels_a_length() -> f32 {
+    let x_scale = length(matrix_row(0u).xyz) * f32(view.size.x);
+    let y_scale = length(matrix_row(1u).xyz) * f32(view.size.y);
+    return 0.5 * max(x_scale, y_scale);
+}
+

@@ -1,0 +1,23 @@
+// A point that irradiance is estimated at, as one texel: the bits of its position in the unit frame, and its geometric
+// normal, octahedral.
+
+struct Receiver {
+    position: vec3f,
+    normal: vec3f,
+    is_seen: bool,
+}
+
+// No normal packs to this.
+const RECEIVER_NOWHERE: u32 = 0x80008000u;
+
+fn receiver_nowhere() -> vec4u {
+    return vec4u(0u, 0u, 0u, RECEIVER_NOWHERE);
+}
+
+fn receiver_pack(position: vec3f, normal: vec3f) -> vec4u {
+    return vec4u(bitcast<vec3u>(position), octahedral_pack(normal));
+}
+
+fn receiver_unpack(texel: vec4u) -> Receiver {
+    return Receiver(bitcast<vec3f>(texel.xyz), octahedral_unpack(texel.w), texel.w != RECEIVER_NOWHERE);
+}

@@ -1,0 +1,595 @@
+//! Density estimation: irradiance at each pixel from the photons around the surface point it sees.
+//!
+//! Inputs: [`Photons`], [`GBuffer`]. Output: [`Irradiance`] (`rgba32float`), at every pixel of the G-buffer or at a part of
+//! them ([`Subsampling`]); alpha is 1 where a surface is seen, else 0. E(x) = Σ Φ K(|x − x_p| / h) / h², K normalised over
+//! the unit disc; photons straight from a light are left out, for direct light is shaded by itself. Sources: Yao et al. 2010,
+//! section 6; Yao et al., soft shadows and image-space photon mapping, section 3.3; Mara et al. 2013 (tiles); Knaus and
+//! Zwicker 2011 ([`progressive_scale`]).
+//!
+//! Cost of the tiled shape: photons sorted, then pixels × photons in the bins that a kernel may reach. Limits: kernels are
+//! at most `max_radius` pixels wide; what hangs over a rim is made up for where the image shows the rim.
+
+pub(crate) mod raster;
+pub(crate) mod sort;
+pub(crate) mod tiled;
+
+use crate::gpu::{self as device, BindGroupCache, Bound, ComputeSpec, Slot, TextureSpec};
+use crate::resource::{GBuffer, Irradiance, PHOTON_BYTES, Photons, Subsampling};
+use crate::{Error, Timestamps, wgsl};
+use raster::{Raster, RasterBuffers};
+use tiled::{Tiled, TiledBuffers};
+
+pub(crate) mod gpu {
+    use bytemuck::{Pod, Zeroable};
+
+    /// Twin of `Bandwidth` in `shaders/pass/photon_splatter/bandwidth.wgsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Bandwidth {
+        pub(crate) scale: f32,
+        pub(crate) lowest: f32,
+        pub(crate) highest: f32,
+        pub(crate) uniform_density: f32,
+        pub(crate) uniform_count: f32,
+        pub(crate) rule: u32,
+        pub(crate) max_radius: f32,
+        pub(crate) factor: u32,
+    }
+
+    /// Twin of `ReceiverParams` in `find_receivers.wgsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct ReceiverParams {
+        pub(crate) factor: u32,
+    }
+
+    /// Twin of `FinishParams` in `finish.wgsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct FinishParams {
+        pub(crate) factor: u32,
+        pub(crate) is_corrected: u32,
+    }
+}
+
+/// Bindings of `shaders/pass/photon_splatter/find_receivers.wgsl`, in order.
+pub(crate) const RECEIVER_SLOTS: [Slot; 6] = [
+    Slot::Uniform,
+    Slot::Uniform,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::StorageTexture(RECEIVER_FORMAT),
+];
+
+/// Bindings of `shaders/pass/photon_splatter/finish.wgsl`, in order.
+pub(crate) const FINISH_SLOTS: [Slot; 8] = [
+    Slot::Uniform,
+    Slot::Uniform,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::UintTexture,
+    Slot::Texture,
+    Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
+];
+
+const RECEIVER_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
+
+/// Pixels of the irradiance along the side of a bin. Twin of `BIN` in `bandwidth.wgsl`.
+pub(crate) const BIN: u32 = 4;
+
+/// Bins beyond each rim of the image. Twin of `BORDER`.
+pub(crate) const BORDER: u32 = 6;
+
+/// Largest kernel radius, pixels, that the border holds, with a pixel of slack.
+pub(crate) const LARGEST_RADIUS: f32 = 23.0;
+
+/// How a photon's kernel is drawn. All give the same light, but for rounding.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SplatShape {
+    /// Photons are sorted into bins of the screen and gathered in f32, in a fixed order: any number of photons a pixel, the
+    /// same bits every frame.
+    #[default]
+    Tiled,
+    /// Blended quads in the surface plane. Surfaces that stand on it within the kernel, as beyond a crease of less than 45°,
+    /// are missed where the quad does not cover them on the screen. Where the size of the G-buffer is no multiple of a
+    /// sub-sampling factor, the last row or column of samples stands up to half a block nearer than quads are drawn for,
+    /// and misses a rim of them. Sums in `rgba16float` lose about a percent at a hundred photons a pixel and stagnate above
+    /// a thousand; where the device has `FLOAT32_BLENDABLE`, an `rgba32float` target does not.
+    Quads,
+    /// Blended flattened icosahedra, which cover all that the kernel may reach from any side: five times the vertices and up
+    /// to twice the pixels of quads. Sums are those of quads.
+    Volumes,
+}
+
+/// Weight of a photon over its disc; each integrates to one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Kernel {
+    /// Uniform: least noise, visible rims.
+    Constant,
+    /// 3/π (1 − r).
+    Cone,
+    /// 2/π (1 − r²): least mean squared error.
+    #[default]
+    Epanechnikov,
+}
+
+/// Radius of a photon's kernel. Wider is smoother and blurrier, and costs as the square.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bandwidth {
+    /// The same for all, as a share of the region's radius.
+    Fixed(f32),
+    /// From the density that the photon's last hop implies: h = √(k A / (π N p̂)), p̂ its density over the uniform one,
+    /// so that about `photons` of N photons lie under a kernel.
+    Density {
+        /// k, photons under a kernel.
+        photons: f32,
+        /// Range that p̂ is clamped to.
+        clamp: [f32; 2],
+    },
+    /// The same with p̂ from how many photons of all hops lie around the photon on the screen, in 3 × 3 bins of 4 × 4 pixels
+    /// of the irradiance, by the area of its plane that they cover.
+    Screen {
+        /// k, photons under a kernel.
+        photons: f32,
+        /// Range that p̂ is clamped to.
+        clamp: [f32; 2],
+    },
+}
+
+/// What is done about kernels that hang over the rim of a surface, where the estimate would darken: to one half at a
+/// straight edge, to a quarter in a corner.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BoundaryCorrection {
+    /// Nothing.
+    Off,
+    /// Each pixel's sum is divided by the part of a kernel of the mean radius around it that lies on its surface, as far as
+    /// the G-buffer shows it: 48 points of its tangent plane are looked up.
+    #[default]
+    KernelArea,
+}
+
+/// Fixed when pipelines are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PhotonSplatterConfig {
+    /// How kernels are drawn.
+    pub shape: SplatShape,
+    /// Their weight.
+    pub kernel: Kernel,
+    /// Format that quads and volumes are blended in, one of [`Irradiance::FORMATS`]; `None`: `rgba16float`. Tiles add up in
+    /// f32 always.
+    pub blend_format: Option<wgpu::TextureFormat>,
+}
+
+impl PhotonSplatterConfig {
+    /// What sums are kept in.
+    fn sum_format(&self) -> wgpu::TextureFormat {
+        match self.shape {
+            SplatShape::Tiled => wgpu::TextureFormat::Rgba32Float,
+            SplatShape::Quads | SplatShape::Volumes => self.blend_format.unwrap_or(wgpu::TextureFormat::Rgba16Float),
+        }
+    }
+}
+
+/// Speed against accuracy, settable every frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PhotonSplatterSettings {
+    /// Kernel radius.
+    pub bandwidth: Bandwidth,
+    /// Widest kernel radius in pixels of the irradiance, up to 23: bounds the cost of a photon near the eye. Where
+    /// irradiance is sub-sampled, kernels may thus be wider by the factor.
+    pub max_radius: f32,
+    /// Factor on the radius, after its clamps: [`progressive_scale`] of the frame where frames are accumulated, else 1.
+    pub radius_scale: f32,
+    /// What is done at rims.
+    pub boundary: BoundaryCorrection,
+}
+
+impl Default for PhotonSplatterSettings {
+    /// In one frame of a Cornell box, 150 photons a kernel halve the squared error that 60 leave, for twice the darkening
+    /// of edges; densities above the uniform one are clamped because that of a single hop says little of how crowded a
+    /// place is (clamping at 8 instead of 1 doubles the error). See `docs/accuracy.md`.
+    fn default() -> Self {
+        Self {
+            bandwidth: Bandwidth::Density {
+                photons: 150.0,
+                clamp: [0.25, 1.0],
+            },
+            max_radius: LARGEST_RADIUS,
+            radius_scale: 1.0,
+            boundary: BoundaryCorrection::default(),
+        }
+    }
+}
+
+/// Factor on the radius in the given frame of an accumulation, counted from 0: h² of frame i + 1 is that of frame i times
+/// (i + α) / (i + 1), α in (0, 1] (Knaus and Zwicker 2011, eq. 15). The variance of the mean then falls as n^−α and its
+/// squared bias as n^−2(1 − α): equally fast, and fastest, at α = 2/3. At 1 radii stay.
+pub fn progressive_scale(frame: u32, alpha: f32) -> f32 {
+    // The product of (i + α) / (i + 1) is Γ(n + α) / (Γ(α) Γ(n + 1)); up to here it is multiplied out, from there on it falls
+    // as n^(α − 1), to a relative error of 1 / n.
+    const EXACT: u32 = 4096;
+    let alpha = f64::from(alpha);
+    let exact = frame.min(EXACT);
+    let product: f64 = (0..exact)
+        .map(|i| (f64::from(i) + alpha) / (f64::from(i) + 1.0))
+        .product();
+    let beyond = (f64::from(frame.max(EXACT)) / f64::from(EXACT)).powf(alpha - 1.0);
+    (product * beyond).sqrt() as f32
+}
+
+/// The pass.
+#[derive(Debug)]
+pub struct PhotonSplatter {
+    device: wgpu::Device,
+    config: PhotonSplatterConfig,
+    receivers: Step,
+    shape: Shape,
+    finish: Step,
+}
+
+#[derive(Debug)]
+enum Shape {
+    Tiled(Box<Tiled>),
+    Raster(Raster),
+}
+
+/// A compute shader of one entry point.
+#[derive(Debug)]
+struct Step {
+    layout: wgpu::BindGroupLayout,
+    pipeline: wgpu::ComputePipeline,
+}
+
+impl Step {
+    fn new(device: &wgpu::Device, slots: &[Slot], spec: &ComputeSpec<'_>) -> Self {
+        let layout = device::layout(device, spec.label, wgpu::ShaderStages::COMPUTE, slots);
+        let pipeline = device::compute_pipeline(
+            device,
+            &ComputeSpec {
+                layouts: &[&layout],
+                ..*spec
+            },
+        );
+        Self { layout, pipeline }
+    }
+}
+
+/// Working memory for one view, made for the size of its irradiance.
+#[derive(Debug)]
+pub struct PhotonSplatterResources {
+    receiver_params: wgpu::Buffer,
+    finish_params: wgpu::Buffer,
+    receivers: wgpu::TextureView,
+    sums: wgpu::TextureView,
+    shape: ShapeBuffers,
+    groups: [BindGroupCache; 2],
+    bytes: u64,
+}
+
+#[derive(Debug)]
+enum ShapeBuffers {
+    Tiled(Box<TiledBuffers>),
+    Raster(RasterBuffers),
+}
+
+/// What a frame gives it.
+#[derive(Debug, Clone, Copy)]
+pub struct PhotonSplatterInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// Light to splat; hop 0 is left out.
+    pub photons: &'a Photons,
+    /// Where it may land. Its view must be set.
+    pub g_buffer: &'a GBuffer,
+    /// Which of its pixels are estimated.
+    pub subsampling: Subsampling,
+    /// Written; `rgba32float`, of the size that [`Subsampling::size`] makes of the G-buffer's.
+    pub irradiance: &'a Irradiance,
+    /// Area of all surfaces, unit-frame lengths squared; sets the uniform density.
+    pub area: f32,
+    /// Radius of the region, unit frame.
+    pub radius: f32,
+    /// How to splat.
+    pub settings: &'a PhotonSplatterSettings,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+impl PhotonSplatter {
+    /// Features that a configuration needs: none, but for blending in `rgba32float`.
+    pub fn required_features(config: &PhotonSplatterConfig) -> wgpu::Features {
+        let blends_f32 = config.shape != SplatShape::Tiled && config.sum_format() == wgpu::TextureFormat::Rgba32Float;
+        if blends_f32 {
+            wgpu::Features::FLOAT32_BLENDABLE
+        } else {
+            wgpu::Features::empty()
+        }
+    }
+
+    /// The pass on this device; default limits suffice.
+    ///
+    /// # Errors
+    /// [`Error::MissingFeatures`] without [`PhotonSplatter::required_features`]; [`Error::IncompatibleView`] for a blend
+    /// format that is not one of [`Irradiance::FORMATS`].
+    pub fn new(device: &wgpu::Device, config: &PhotonSplatterConfig) -> Result<Self, Error> {
+        let missing = Self::required_features(config) - device.features();
+        if !missing.is_empty() {
+            return Err(Error::MissingFeatures {
+                what: "PhotonSplatter shapes blended in rgba32float",
+                missing,
+                instead: "rgba16float, or the tiled shape",
+            });
+        }
+        if !Irradiance::FORMATS.contains(&config.sum_format()) {
+            return Err(Error::IncompatibleView {
+                resource: "PhotonSplatterConfig::blend_format",
+                property: "format",
+                expected: format!("{:?}", Irradiance::FORMATS),
+                found: format!("{:?}", config.sum_format()),
+            });
+        }
+        let kernel = [("kernel", f64::from(config.kernel as u32))];
+        let step = |label, source, entry_point, constants, slots: &[Slot]| {
+            let spec = ComputeSpec {
+                label,
+                source,
+                entry_point,
+                layouts: &[],
+                constants,
+            };
+            Step::new(device, slots, &spec)
+        };
+        Ok(Self {
+            device: device.clone(),
+            config: *config,
+            receivers: step(
+                "lightfall::PhotonSplatter::receivers",
+                wgsl::PHOTON_SPLATTER_RECEIVERS,
+                "find_receivers",
+                &[],
+                &RECEIVER_SLOTS,
+            ),
+            shape: match config.shape {
+                SplatShape::Tiled => Shape::Tiled(Box::new(Tiled::new(device, &kernel))),
+                SplatShape::Quads | SplatShape::Volumes => Shape::Raster(Raster::new(device, config, &kernel)),
+            },
+            finish: step(
+                "lightfall::PhotonSplatter::finish",
+                wgsl::PHOTON_SPLATTER_FINISH,
+                "finish_pixels",
+                &kernel,
+                &FINISH_SLOTS,
+            ),
+        })
+    }
+
+    /// What it was made with.
+    pub fn config(&self) -> &PhotonSplatterConfig {
+        &self.config
+    }
+
+    /// Records the estimate.
+    pub fn record(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut PhotonSplatterResources,
+        inputs: &PhotonSplatterInputs<'_>,
+    ) {
+        encoder.push_debug_group("lightfall::PhotonSplatter");
+        self.find_receivers(encoder, resources, inputs);
+        let bandwidth = bandwidth(inputs);
+        match (&self.shape, &mut resources.shape) {
+            (Shape::Tiled(tiled), ShapeBuffers::Tiled(buffers)) => {
+                let targets = (&resources.receivers, &resources.sums);
+                tiled.record(&self.device, encoder, buffers, inputs, &bandwidth, targets);
+            }
+            (Shape::Raster(raster), ShapeBuffers::Raster(buffers)) => {
+                let targets = (&resources.receivers, &resources.sums);
+                raster.record(&self.device, encoder, buffers, inputs, &bandwidth, targets);
+            }
+            // Resources of another shape: nothing is estimated.
+            _ => {}
+        }
+        self.finish(encoder, resources, inputs);
+        encoder.pop_debug_group();
+    }
+
+    fn find_receivers(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut PhotonSplatterResources,
+        inputs: &PhotonSplatterInputs<'_>,
+    ) {
+        let params = gpu::ReceiverParams {
+            factor: inputs.subsampling.factor(),
+        };
+        inputs
+            .queue
+            .write_buffer(&resources.receiver_params, 0, bytemuck::bytes_of(&params));
+        let views = inputs.g_buffer.views();
+        let bound: [Bound; 6] = [
+            (&resources.receiver_params).into(),
+            inputs.g_buffer.view_buffer().into(),
+            (&views.depth).into(),
+            (&views.normal).into(),
+            (&views.base_color).into(),
+            (&resources.receivers).into(),
+        ];
+        let label = "lightfall::PhotonSplatter::receivers";
+        let group = resources.groups[0].get(&self.device, label, &self.receivers.layout, &bound);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        dispatch_pixels(&mut pass, &self.receivers.pipeline, &group, inputs);
+    }
+
+    fn finish(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut PhotonSplatterResources,
+        inputs: &PhotonSplatterInputs<'_>,
+    ) {
+        let params = gpu::FinishParams {
+            factor: inputs.subsampling.factor(),
+            is_corrected: u32::from(inputs.settings.boundary == BoundaryCorrection::KernelArea),
+        };
+        inputs
+            .queue
+            .write_buffer(&resources.finish_params, 0, bytemuck::bytes_of(&params));
+        let views = inputs.g_buffer.views();
+        let bound: [Bound; 8] = [
+            (&resources.finish_params).into(),
+            inputs.g_buffer.view_buffer().into(),
+            (&views.depth).into(),
+            (&views.normal).into(),
+            (&views.base_color).into(),
+            (&resources.receivers).into(),
+            (&resources.sums).into(),
+            inputs.irradiance.view().into(),
+        ];
+        let label = "lightfall::PhotonSplatter::finish";
+        let group = resources.groups[1].get(&self.device, label, &self.finish.layout, &bound);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        dispatch_pixels(&mut pass, &self.finish.pipeline, &group, inputs);
+    }
+}
+
+/// One invocation for each pixel of the irradiance, in workgroups of 8 × 8.
+fn dispatch_pixels(
+    pass: &mut wgpu::ComputePass<'_>,
+    pipeline: &wgpu::ComputePipeline,
+    group: &wgpu::BindGroup,
+    inputs: &PhotonSplatterInputs<'_>,
+) {
+    let [width, height] = inputs.subsampling.size(inputs.g_buffer.size());
+    pass.set_pipeline(pipeline);
+    pass.set_bind_group(0, group, &[]);
+    pass.dispatch_workgroups(width.div_ceil(8), height.div_ceil(8), 1);
+}
+
+impl PhotonSplatterResources {
+    /// Bytes of working memory for photon buffers of `slots` slots, hop 0 not counted, and irradiance of `size`.
+    pub fn size_in_bytes(config: &PhotonSplatterConfig, slots: u32, size: [u32; 2]) -> u64 {
+        let params = size_of::<gpu::ReceiverParams>() + size_of::<gpu::FinishParams>();
+        let textures = [RECEIVER_FORMAT, config.sum_format()].map(|format| device::texture_bytes(size, 1, format));
+        let shape = match config.shape {
+            SplatShape::Tiled => TiledBuffers::size_in_bytes(slots, size),
+            SplatShape::Quads | SplatShape::Volumes => RasterBuffers::size_in_bytes(size),
+        };
+        params as u64 + textures.iter().sum::<u64>() + shape
+    }
+
+    /// Whether working memory for this many paths and bounces fits the device, without making it.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`].
+    pub fn check(device: &wgpu::Device, config: &PhotonSplatterConfig, count: u32, bounces: u32) -> Result<(), Error> {
+        if config.shape != SplatShape::Tiled {
+            return Ok(());
+        }
+        TiledBuffers::check(device, count.saturating_mul(bounces))
+    }
+
+    /// Working memory for this many photons and irradiance of this size: the G-buffer's, or what [`Subsampling::size`]
+    /// makes of it.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`].
+    pub fn new(
+        device: &wgpu::Device,
+        config: &PhotonSplatterConfig,
+        photons: &Photons,
+        size: [u32; 2],
+    ) -> Result<Self, Error> {
+        use wgpu::TextureUsages as U;
+        let texture = |label, format, usage| {
+            let spec = TextureSpec {
+                label,
+                size,
+                layers: 1,
+                format,
+                usage: usage | U::TEXTURE_BINDING,
+            };
+            Ok::<_, Error>(device::texture(device, &spec)?.create_view(&Default::default()))
+        };
+        let slots = splatted_slots(photons);
+        let (shape, sum_usage) = match config.shape {
+            SplatShape::Tiled => {
+                let buffers = TiledBuffers::new(device, slots, size)?;
+                (ShapeBuffers::Tiled(Box::new(buffers)), U::STORAGE_BINDING)
+            }
+            SplatShape::Quads | SplatShape::Volumes => {
+                let buffers = RasterBuffers::new(device, size)?;
+                (ShapeBuffers::Raster(buffers), U::RENDER_ATTACHMENT)
+            }
+        };
+        let receivers = texture(
+            "lightfall::PhotonSplatter::receivers",
+            RECEIVER_FORMAT,
+            U::STORAGE_BINDING,
+        )?;
+        Ok(Self {
+            receiver_params: device::uniform_buffer::<gpu::ReceiverParams>(
+                device,
+                "lightfall::PhotonSplatter::receiver_params",
+            )?,
+            finish_params: device::uniform_buffer::<gpu::FinishParams>(
+                device,
+                "lightfall::PhotonSplatter::finish_params",
+            )?,
+            receivers,
+            sums: texture("lightfall::PhotonSplatter::sums", config.sum_format(), sum_usage)?,
+            shape,
+            groups: Default::default(),
+            bytes: Self::size_in_bytes(config, slots, size),
+        })
+    }
+
+    /// Bytes allocated.
+    pub fn memory_use(&self) -> u64 {
+        self.bytes
+    }
+}
+
+/// All slots but hop 0.
+fn splatted_slots(photons: &Photons) -> u32 {
+    let slots = photons.slots() - photons.count();
+    debug_assert!(photons.buffer().size() >= u64::from(photons.slots()) * PHOTON_BYTES);
+    slots
+}
+
+/// Bins along both axes of irradiance of this size. Twin of `bin_grid` in `bandwidth.wgsl`.
+fn bin_grid(size: [u32; 2]) -> [u32; 2] {
+    size.map(|length| length.div_ceil(BIN) + 2 * BORDER)
+}
+
+fn bin_total(size: [u32; 2]) -> u32 {
+    bin_grid(size).iter().product()
+}
+
+fn bandwidth(inputs: &PhotonSplatterInputs<'_>) -> gpu::Bandwidth {
+    let (settings, factor) = (inputs.settings, inputs.subsampling.factor());
+    let emitted = inputs.photons.count().max(1) as f32;
+    // Twins of `BANDWIDTH_…`.
+    let (rule, clamp) = match settings.bandwidth {
+        Bandwidth::Fixed(_) => (0, [1.0; 2]),
+        Bandwidth::Density { clamp, .. } => (1, clamp),
+        Bandwidth::Screen { clamp, .. } => (2, clamp),
+    };
+    let scale = match settings.bandwidth {
+        Bandwidth::Fixed(share) => share * inputs.radius,
+        Bandwidth::Density { photons, .. } | Bandwidth::Screen { photons, .. } => {
+            (photons * inputs.area / (std::f32::consts::PI * emitted)).sqrt()
+        }
+    };
+    gpu::Bandwidth {
+        scale: scale * settings.radius_scale,
+        lowest: clamp[0],
+        highest: clamp[1],
+        uniform_density: 1.0 / inputs.area,
+        uniform_count: emitted / inputs.area,
+        rule,
+        max_radius: settings.max_radius.clamp(0.0, LARGEST_RADIUS) * factor as f32,
+        factor,
+    }
+}
