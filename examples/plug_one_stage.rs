@@ -169,6 +169,7 @@ impl IndirectLight {
             irradiance: self.upsampling.as_ref().map_or(&self.irradiance, |u| &u.coarse),
             area: self.area,
             radius: self.frame.radius(),
+            sample_offset: 0,
             settings: &PhotonSplatterSettings::default(),
             timestamps: None,
         };

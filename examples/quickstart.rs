@@ -44,6 +44,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         queue,
         geometry: &geometry,
         view: &cameras[0],
+        accumulated: 0,
         composite: &composite,
         timestamps: None,
     };

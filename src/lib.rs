@@ -79,6 +79,7 @@
 //!     queue: &queue,
 //!     geometry: &geometry,
 //!     view: &cameras[0],
+//!     accumulated: 0,
 //!     composite: &composite,
 //!     timestamps: None,
 //! };

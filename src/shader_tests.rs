@@ -291,7 +291,9 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::PHOTON_SPLATTER_QUADS, "RasterParams", raster::gpu::RasterParams {
             bandwidth, clip_scale, clip_shift, first_slot, slot_count, row, _pad,
         }),
-        twin!(wgsl::PHOTON_SPLATTER_FINISH, "FinishParams", photon_splatter::gpu::FinishParams { factor, is_corrected }),
+        twin!(wgsl::PHOTON_SPLATTER_FINISH, "FinishParams", photon_splatter::gpu::FinishParams {
+            factor, is_corrected, sample_offset,
+        }),
         twin!(wgsl::UPSAMPLER, "Params", upsampler::gpu::Params { factor, normal_agreement, plane_distance }),
         twin!(wgsl::DIRECT_LIGHT, "Params", direct_light::gpu::Params { light_count, shadow_map_size }),
         twin!(wgsl::NEAREST_OCCLUDER, "Params", nearest_occluder::gpu::Params {

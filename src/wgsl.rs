@@ -212,6 +212,9 @@ pub(crate) const PHOTON_SPLATTER_FINISH: &str = compose![
     "common/subsampling.wgsl",
     "common/octahedral.wgsl",
     "common/sampling.wgsl",
+    "common/random.wgsl",
+    "common/halton.wgsl",
+    "common/hash.wgsl",
 ];
 
 pub(crate) const UPSAMPLER: &str = compose![

@@ -488,6 +488,7 @@ impl<'a> Host<'a> {
             queue,
             geometry: &self.geometry,
             view: &cameras[0],
+            accumulated: 0,
             composite: &CompositeSettings::default(),
             timestamps: None,
         };

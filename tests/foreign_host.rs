@@ -192,6 +192,7 @@ fn composed(engine: &Engine, subsampling: Subsampling) -> Composed {
         queue,
         geometry,
         view: &cameras[0],
+        accumulated: 0,
         composite: &composite,
         timestamps,
     };
@@ -479,6 +480,7 @@ fn a_part_anywhere_in_larger_textures_is_lit_as_if_it_were_alone() {
         irradiance: &irradiance,
         area: indirect.frame.area(engine.world.area()),
         radius: indirect.frame.radius(),
+        sample_offset: 0,
         settings: &PhotonSplatterSettings::default(),
         timestamps: None,
     };

@@ -71,6 +71,7 @@ fn record(
         queue,
         geometry,
         view: &cameras[0],
+        accumulated: 0,
         composite: &composite,
         timestamps: None,
     };
@@ -320,6 +321,7 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
         irradiance: &coarse,
         area: (summary.area / (unit * unit)) as f32,
         radius: frame.radius(),
+        sample_offset: 0,
         settings: &settings.splatter,
         timestamps,
     };
@@ -842,6 +844,7 @@ fn record_views(
             queue,
             geometry,
             view: camera,
+            accumulated: 0,
             composite: &CompositeSettings::default(),
             timestamps: None,
         };

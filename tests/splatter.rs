@@ -6,8 +6,8 @@ mod common;
 use common::statistics::Random;
 use common::{Gpu, Wishes, assert_no_errors, gpu, gpu_with};
 use lightfall::pass::{
-    Bandwidth, Kernel, PhotonSplatter, PhotonSplatterConfig, PhotonSplatterInputs, PhotonSplatterResources,
-    PhotonSplatterSettings, SplatShape,
+    Bandwidth, BoundaryCorrection, Kernel, PhotonSplatter, PhotonSplatterConfig, PhotonSplatterInputs,
+    PhotonSplatterResources, PhotonSplatterSettings, SplatShape,
 };
 use lightfall::resource::{
     CameraView, GBuffer, GBufferViews, Irradiance, NormalEncoding, Photon, Photons, Subsampling,
@@ -18,6 +18,12 @@ const SIZE: u32 = 64;
 
 /// The plane z = 0 seen along −z: x and y in [−1, 1] fill the view.
 fn plane_g_buffer(gpu: &Gpu) -> GBuffer {
+    masked_g_buffer(gpu, &[255; (SIZE * SIZE) as usize])
+}
+
+/// The same where it is cut away in pixels whose mask is 0.
+fn masked_g_buffer(gpu: &Gpu, mask: &[u8]) -> GBuffer {
+    let base_color: Vec<u8> = mask.iter().flat_map(|&alpha| [255, 255, 255, alpha]).collect();
     let texture = |format: wgpu::TextureFormat, texel: &[u8]| {
         let size = wgpu::Extent3d {
             width: SIZE,
@@ -34,12 +40,15 @@ fn plane_g_buffer(gpu: &Gpu) -> GBuffer {
             usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         });
+        let texels = match texel.len() {
+            1..=16 => texel.repeat((SIZE * SIZE) as usize),
+            _ => texel.to_vec(),
+        };
         let layout = wgpu::TexelCopyBufferLayout {
             offset: 0,
-            bytes_per_row: Some(SIZE * texel.len() as u32),
+            bytes_per_row: Some((texels.len() as u32) / SIZE),
             rows_per_image: None,
         };
-        let texels = texel.repeat((SIZE * SIZE) as usize);
         gpu.queue.write_texture(texture.as_image_copy(), &texels, layout, size);
         texture.create_view(&Default::default())
     };
@@ -49,7 +58,7 @@ fn plane_g_buffer(gpu: &Gpu) -> GBuffer {
         // +z as × 0.5 + 0.5; 128 / 255 is as near to zero as eight bits come.
         normal: texture(F::Rgba8Unorm, &[128, 128, 255, 0]),
         normal_encoding: NormalEncoding::HalfOffset,
-        base_color: texture(F::Rgba8Unorm, &[255; 4]),
+        base_color: texture(F::Rgba8Unorm, &base_color),
         emission: texture(F::Rgba8Unorm, &[0; 4]),
         rectangle: None,
     };
@@ -80,50 +89,49 @@ fn photon(x: f32, y: f32, flux: [f32; 3]) -> Photon {
     }
 }
 
-/// Irradiance of every pixel from these photons, RGB.
+/// Irradiance of every pixel of the whole plane from these photons, RGB, without correction at the view's rim.
 fn splat(gpu: &Gpu, config: PhotonSplatterConfig, photons: &[Photon], radius: f32) -> Vec<[f32; 4]> {
+    let settings = PhotonSplatterSettings {
+        bandwidth: Bandwidth::Fixed(radius),
+        boundary: BoundaryCorrection::Off,
+        ..Default::default()
+    };
+    splat_onto(gpu, &plane_g_buffer(gpu), config, photons, &settings)
+}
+
+/// The same with these settings, of any G-buffer.
+fn splat_onto(
+    gpu: &Gpu,
+    g_buffer: &GBuffer,
+    config: PhotonSplatterConfig,
+    photons: &[Photon],
+    settings: &PhotonSplatterSettings,
+) -> Vec<[f32; 4]> {
     let count = photons.len() as u32;
     // Hop 0 is direct light and stays out: photons are hop 1 of as many paths.
     let resource = Photons::new(&gpu.device, count, 1).unwrap();
     let offset = u64::from(count) * lightfall::resource::PHOTON_BYTES;
     gpu.queue
         .write_buffer(resource.buffer(), offset, bytemuck::cast_slice(photons));
-    let g_buffer = plane_g_buffer(gpu);
     let pass = PhotonSplatter::new(&gpu.device, &config).unwrap();
     let mut resources = PhotonSplatterResources::new(&gpu.device, &config, &resource, [SIZE; 2]).unwrap();
     let irradiance = Irradiance::new(&gpu.device, [SIZE; 2], wgpu::TextureFormat::Rgba32Float).unwrap();
-    let settings = PhotonSplatterSettings {
-        bandwidth: Bandwidth::Fixed(radius),
-        ..Default::default()
-    };
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let inputs = PhotonSplatterInputs {
         queue: &gpu.queue,
         photons: &resource,
-        g_buffer: &g_buffer,
+        g_buffer,
         subsampling: Subsampling::Full,
         irradiance: &irradiance,
         area: 4.0,
         radius: 1.0,
-        settings: &settings,
+        sample_offset: 0,
+        settings,
         timestamps: None,
     };
     pass.record(&mut encoder, &mut resources, &inputs);
     gpu.queue.submit([encoder.finish()]);
-    read(gpu, &irradiance)
-}
-
-/// Reads either format through `rgba32float`.
-fn read(gpu: &Gpu, irradiance: &Irradiance) -> Vec<[f32; 4]> {
-    if irradiance.format() == wgpu::TextureFormat::Rgba32Float {
-        return read_rgba32float_blocking(&gpu.device, &gpu.queue, irradiance.view().texture()).unwrap();
-    }
-    let wide = Irradiance::new(&gpu.device, irradiance.size(), wgpu::TextureFormat::Rgba32Float).unwrap();
-    let blitter = wgpu::util::TextureBlitter::new(&gpu.device, wgpu::TextureFormat::Rgba32Float);
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    blitter.copy(&gpu.device, &mut encoder, irradiance.view(), wide.view());
-    gpu.queue.submit([encoder.finish()]);
-    read_rgba32float_blocking(&gpu.device, &gpu.queue, wide.view().texture()).unwrap()
+    read_rgba32float_blocking(&gpu.device, &gpu.queue, irradiance.view().texture()).unwrap()
 }
 
 /// Photons of equal flux, one watt in all, at random in the middle quarter of the view, so that no kernel hangs over.
@@ -321,6 +329,91 @@ fn a_photon_on_the_other_side_gives_nothing() {
     for (what, p) in [("behind the plane", below), ("on a plane above", above)] {
         let sum = arriving(&splat(&gpu, config(SplatShape::Tiled), &[p], 0.3));
         assert_eq!(sum, 0.0, "{what}");
+    }
+    assert_no_errors(&gpu);
+}
+
+/// The square |x|, |y| < 1/2 of the view.
+fn is_on_plate(pixel: u32) -> bool {
+    let (x, y) = (pixel % SIZE, pixel / SIZE);
+    let inside = SIZE / 4..SIZE - SIZE / 4;
+    inside.contains(&x) && inside.contains(&y)
+}
+
+/// A plate of 1 m², and `side`² photons of a watt in all spread evenly over it: irradiance is 1 W/m² everywhere.
+fn plate(gpu: &Gpu, side: u32) -> (GBuffer, Vec<Photon>) {
+    let mask: Vec<u8> = (0..SIZE * SIZE).map(|i| if is_on_plate(i) { 255 } else { 0 }).collect();
+    let at = |i: u32| (i as f32 + 0.5) / side as f32 - 0.5;
+    let flux = [1.0 / (side * side) as f32; 3];
+    let photons = (0..side * side).map(|i| photon(at(i % side), at(i / side), flux));
+    (masked_g_buffer(gpu, &mask), photons.collect())
+}
+
+#[test]
+fn light_at_the_rim_of_a_plate_is_as_bright_as_in_its_middle_once_kernels_are_cut() {
+    let Some(gpu) = gpu() else { return };
+    let (g_buffer, photons) = plate(&gpu, 160);
+    // A corner holds 16 of the 64 points: two more or less are an eighth.
+    for kernel in [Kernel::Constant, Kernel::Cone, Kernel::Epanechnikov] {
+        let range = |boundary| {
+            let config = PhotonSplatterConfig {
+                kernel,
+                ..Default::default()
+            };
+            let settings = PhotonSplatterSettings {
+                bandwidth: Bandwidth::Fixed(RADIUS),
+                boundary,
+                ..Default::default()
+            };
+            let pixels = splat_onto(&gpu, &g_buffer, config, &photons, &settings);
+            let plate = (0..).zip(&pixels).filter(|&(i, _)| is_on_plate(i));
+            plate.fold((f32::MAX, 0f32), |(least, most), (_, p)| {
+                (least.min(p[0]), most.max(p[0]))
+            })
+        };
+        let (off, corrected) = (range(BoundaryCorrection::Off), range(BoundaryCorrection::KernelArea));
+        println!("{kernel:?}: {off:?} uncorrected, {corrected:?} corrected");
+        assert!(off.0 < 0.35 && off.1 < 1.01, "{kernel:?}: a quarter in the corners");
+        assert!(corrected.0 > 0.87 && corrected.1 < 1.15, "{kernel:?}: {corrected:?}");
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn all_shapes_and_rules_give_the_same_light() {
+    let Some(gpu) = gpu() else { return };
+    let (g_buffer, photons) = plate(&gpu, 60);
+    // A radius of 0.1 holds π/100 of the plate's photons, which cover a quarter of the view's area: their density is four
+    // times the uniform one. By the screen, radii at the rim are up to twice as wide, for the bins there are half empty.
+    // Each addition in sixteen bits may cut off half a step of 2^-11.
+    let under_a_kernel = 0.01 * std::f32::consts::PI * 3600.0;
+    let rules = [
+        Bandwidth::Fixed(0.1),
+        Bandwidth::Density {
+            photons: under_a_kernel,
+            clamp: [4.0, 4.0],
+        },
+        Bandwidth::Screen {
+            photons: under_a_kernel,
+            clamp: [1.0, 100.0],
+        },
+    ];
+    for (bandwidth, additions) in rules.into_iter().zip([114.0, 114.0, 456.0]) {
+        let settings = PhotonSplatterSettings {
+            bandwidth,
+            ..Default::default()
+        };
+        let image = |shape| splat_onto(&gpu, &g_buffer, config(shape), &photons, &settings);
+        let tiled = image(SplatShape::Tiled);
+        let sum = arriving(&tiled);
+        println!("{bandwidth:?}: {sum:.4} W");
+        assert!((sum - 1.0).abs() < 0.02, "{bandwidth:?}: {sum} W");
+        for shape in [SplatShape::Quads, SplatShape::Volumes] {
+            let pairs = image(shape).into_iter().zip(&tiled);
+            let worst = pairs.map(|(a, b)| (a[0] - b[0]).abs()).fold(0f32, f32::max);
+            println!("    {shape:?}: off by {worst:.4} W/m² at most");
+            assert!(worst < additions / 4096.0, "{bandwidth:?}, {shape:?}: {worst}");
+        }
     }
     assert_no_errors(&gpu);
 }

@@ -847,6 +847,7 @@ fn splat(
         irradiance: &target,
         area: 1.0,
         radius: 1.0,
+        sample_offset: 0,
         settings: &settings,
         timestamps: None,
     };

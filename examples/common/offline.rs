@@ -121,6 +121,7 @@ impl<'a> Offline<'a> {
             queue,
             geometry,
             view: &cameras[0],
+            accumulated: self.accumulator.as_ref().map_or(0, |(_, resources)| resources.frames()),
             composite: &self.composite,
             timestamps,
         };

@@ -12,9 +12,9 @@ use super::{Plan, Settings, Stage};
 use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, CoverageMeasure, DirectLight, DirectLightInputs,
     DirectLightResources, EnvMapSelector, GBufferCapture, GBufferCaptureInputs, NearestOccluder, NearestOccluderInputs,
-    NearestOccluderResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, ShadowMapCapture,
-    ShadowMapCaptureInputs, ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources, Upsampler,
-    UpsamplerInputs, UpsamplerResources,
+    NearestOccluderResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings,
+    ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources, SoftShadow, SoftShadowInputs,
+    SoftShadowResources, Upsampler, UpsamplerInputs, UpsamplerResources, progressive_scale,
 };
 #[cfg(feature = "bvh")]
 use crate::resource::BvhGeometry;
@@ -49,6 +49,8 @@ pub struct GiRenderer {
     env_map_layers: Vec<u32>,
     /// That photons were last traced in.
     photons_frame: Option<UnitFrame>,
+    /// Of the photons.
+    sample_offset: u32,
     /// This frame's share of the selection, and its views.
     selection: Option<(Work, std::ops::Range<usize>)>,
 }
@@ -140,6 +142,9 @@ pub struct ViewInputs<'a> {
     pub geometry: &'a dyn Geometry,
     /// One of the views that were prepared.
     pub view: &'a CameraView,
+    /// Frames of this view that are in the mean already, where frames are accumulated: kernels narrow with them
+    /// ([`Settings::radius_alpha`]). 0 in real time, and again when the view, a light or geometry has changed.
+    pub accumulated: u32,
     /// What to show; `output_scale` is taken as given, see [`UnitFrame::output_scale`].
     pub composite: &'a CompositeSettings,
     /// Sink for GPU time.
@@ -191,6 +196,7 @@ impl GiRenderer {
             recapture: Recapture::default(),
             env_map_layers: Vec::new(),
             photons_frame: None,
+            sample_offset: 0,
             selection: None,
         })
     }
@@ -486,6 +492,7 @@ impl GiRenderer {
             indirect.record(encoder, &self.passes.photons, &photon_inputs)?;
             self.recapture.recorded();
             self.photons_frame = self.state.as_ref().map(|s| s.frame);
+            self.sample_offset = inputs.sample_offset;
         }
         Ok(())
     }
@@ -629,6 +636,10 @@ impl GiRenderer {
             self.passes.direct_light.record(encoder, own, &direct_inputs);
         }
         if let (Some(scene), Some(own), Some(state)) = (&self.indirect, &mut resources.indirect, &self.state) {
+            let settings = PhotonSplatterSettings {
+                radius_scale: progressive_scale(inputs.accumulated, self.settings.radius_alpha),
+                ..self.settings.splatter
+            };
             let splatter_inputs = PhotonSplatterInputs {
                 queue: inputs.queue,
                 photons: &scene.photons,
@@ -637,7 +648,8 @@ impl GiRenderer {
                 irradiance: own.coarse.as_ref().map_or(&own.irradiance, |c| &c.0),
                 area: state.area,
                 radius: state.frame.radius(),
-                settings: &self.settings.splatter,
+                sample_offset: self.sample_offset,
+                settings: &settings,
                 timestamps: inputs.timestamps,
             };
             self.passes

@@ -4,6 +4,8 @@ struct FinishParams {
     factor: u32,
     // 1: kernels count by the part of them that lies on the surface
     is_corrected: u32,
+    // Turns the points that are looked at, so that their error averages out over frames
+    sample_offset: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: FinishParams;
@@ -16,8 +18,10 @@ struct FinishParams {
 @group(0) @binding(6) var sums: texture_2d<f32>;
 @group(0) @binding(7) var irradiance: texture_storage_2d<rgba32float, write>;
 
-// Points of the disc that are looked at.
-const BOUNDARY_POINTS: u32 = 48u;
+// Points of the disc that are looked at, as densely as the kernel weighs.
+const BOUNDARY_POINTS: u32 = 64u;
+// Random dimension of their turn: none that the walk uses.
+const BOUNDARY_DIMENSION: u32 = 4096u;
 const BOUNDARY_GOLDEN_ANGLE: f32 = 2.399963230;
 // No kernel counts for less than this: in the tip of a corner of 30 degrees a twelfth of it is on the surface.
 const BOUNDARY_LEAST: f32 = 0.08;
@@ -63,21 +67,21 @@ fn boundary_at(receiver: Receiver, y: vec3f, slab: f32) -> u32 {
 fn boundary_share(receiver: Receiver, radius: f32) -> f32 {
     let frame = sampling_frame(receiver.normal);
     let slab = splat_slab(radius);
-    var on = 0.0;
-    var known = 0.0;
+    let start = 6.283185307 * random_unit(params.sample_offset, BOUNDARY_DIMENSION);
+    var on = 0u;
+    var known = 0u;
     for (var i = 0u; i < BOUNDARY_POINTS; i++) {
-        let q = (f32(i) + 0.5) / f32(BOUNDARY_POINTS);
-        let turn = BOUNDARY_GOLDEN_ANGLE * f32(i);
-        let offset = radius * sqrt(q) * vec2f(cos(turn), sin(turn));
+        let distance = radius * splat_kernel_radius((f32(i) + 0.5) / f32(BOUNDARY_POINTS));
+        let turn = start + BOUNDARY_GOLDEN_ANGLE * f32(i);
+        let offset = distance * vec2f(cos(turn), sin(turn));
         let state = boundary_at(receiver, receiver.position + offset.x * frame[0] + offset.y * frame[1], slab);
-        let weight = splat_kernel(vec4f(q)).x;
-        known += select(weight, 0.0, state == BOUNDARY_UNKNOWN);
-        on += select(0.0, weight, state == BOUNDARY_ON);
+        known += u32(state != BOUNDARY_UNKNOWN);
+        on += u32(state == BOUNDARY_ON);
     }
-    if known <= 0.0 {
+    if known == 0u {
         return 1.0;
     }
-    return max(on / known, BOUNDARY_LEAST);
+    return max(f32(on) / f32(known), BOUNDARY_LEAST);
 }
 
 @compute @workgroup_size(8, 8)

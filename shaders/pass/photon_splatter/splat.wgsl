@@ -22,6 +22,15 @@ fn splat_kernel(q: vec4f) -> vec4f {
     }
 }
 
+// The relative distance within which a kernel has this share of its weight: the inverses of r^2, 3 r^2 - 2 r^3, 2 r^2 - r^4.
+fn splat_kernel_radius(share: f32) -> f32 {
+    switch kernel {
+        case 0u: { return sqrt(share); }
+        case 1u: { return 0.5 - sin(asin(1.0 - 2.0 * share) / 3.0); }
+        default: { return sqrt(1.0 - sqrt(1.0 - share)); }
+    }
+}
+
 // Half thickness of the slab that receives a photon of this radius.
 fn splat_slab(radius: f32) -> f32 {
     return SPLAT_SLAB * radius + SPLAT_SLAB_FLOOR;

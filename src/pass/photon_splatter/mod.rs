@@ -49,6 +49,7 @@ pub(crate) mod gpu {
     pub(crate) struct FinishParams {
         pub(crate) factor: u32,
         pub(crate) is_corrected: u32,
+        pub(crate) sample_offset: u32,
     }
 }
 
@@ -145,7 +146,7 @@ pub enum BoundaryCorrection {
     /// Nothing.
     Off,
     /// Each pixel's sum is divided by the part of a kernel of the mean radius around it that lies on its surface, as far as
-    /// the G-buffer shows it: 48 points of its tangent plane are looked up.
+    /// the G-buffer shows it: 64 points of its tangent plane are looked up.
     #[default]
     KernelArea,
 }
@@ -291,6 +292,8 @@ pub struct PhotonSplatterInputs<'a> {
     pub area: f32,
     /// Radius of the region, unit frame.
     pub radius: f32,
+    /// Number of the frame's first path, as the tracers have it: another in each frame that is accumulated.
+    pub sample_offset: u32,
     /// How to splat.
     pub settings: &'a PhotonSplatterSettings,
     /// Sink for GPU time.
@@ -432,6 +435,7 @@ impl PhotonSplatter {
         let params = gpu::FinishParams {
             factor: inputs.subsampling.factor(),
             is_corrected: u32::from(inputs.settings.boundary == BoundaryCorrection::KernelArea),
+            sample_offset: inputs.sample_offset,
         };
         inputs
             .queue
