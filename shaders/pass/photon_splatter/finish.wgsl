@@ -26,21 +26,18 @@ const BOUNDARY_GOLDEN_ANGLE: f32 = 2.399963230;
 // No kernel counts for less than this: in the tip of a corner of 30 degrees a twelfth of it is on the surface.
 const BOUNDARY_LEAST: f32 = 0.08;
 
-const BOUNDARY_ON: u32 = 0u;
-const BOUNDARY_OFF: u32 = 1u;
-const BOUNDARY_UNKNOWN: u32 = 2u;
-
-// Whether the receiver's surface goes on at y, a point of its tangent plane, as far as the image tells.
-fn boundary_at(receiver: Receiver, y: vec3f, slab: f32) -> u32 {
+// Whether the receiver's surface goes on at y, a point of its tangent plane, as far as the image tells. What it does not show
+// is taken to go on.
+fn boundary_goes_on(receiver: Receiver, y: vec3f, slab: f32) -> bool {
     let clip = view.view_projection * vec4f(y, 1.0);
     let ndc = clip.xy / clip.w;
     if !(clip.w > 0.0) || !all(abs(ndc) < vec2f(1.0)) {
-        return BOUNDARY_UNKNOWN;
+        return true;
     }
     let pixel = min(vec2u((vec2f(0.5, 0.5) + vec2f(0.5, -0.5) * ndc) * vec2f(view.size)), view.size - 1u);
     let at = pixel + view.origin;
     if textureLoad(base_color_texture, at, 0).a <= 0.0 {
-        return BOUNDARY_OFF;
+        return false;
     }
     // Where the pixel's ray meets what it sees, and where it would meet the plane: at the pixel's middle, not at y, for
     // seen at a grazing angle that is far from it.
@@ -48,19 +45,19 @@ fn boundary_at(receiver: Receiver, y: vec3f, slab: f32) -> u32 {
     let normal = g_buffer_normal(view, textureLoad(normal_texture, at, 0));
     let off_plane = dot(seen - receiver.position, receiver.normal);
     if abs(off_plane) <= slab && dot(normal, receiver.normal) >= SPLAT_NORMAL_AGREEMENT {
-        return BOUNDARY_ON;
+        return true;
     }
     let ray = seen - view.eye.xyz * view.eye.w;
     let to_seen = select(view.eye.xyz, ray, view.eye.w > 0.0);
     if dot(to_seen, receiver.normal) * off_plane > 0.0 {
         // What is seen lies beyond the plane: nothing of the plane was in the way.
-        return BOUNDARY_OFF;
+        return false;
     }
     // Something is before the plane. If the receiver is on its outer side and y on its inner one, the surface ends
     // against it.
     let is_before = dot(receiver.position - seen, normal) > 0.0;
     let is_within = dot(y - seen, normal) <= 0.0;
-    return select(BOUNDARY_UNKNOWN, BOUNDARY_OFF, is_before && is_within);
+    return !(is_before && is_within);
 }
 
 // Share of a kernel of this radius around the receiver that lies on its surface.
@@ -69,19 +66,14 @@ fn boundary_share(receiver: Receiver, radius: f32) -> f32 {
     let slab = splat_slab(radius);
     let start = 6.283185307 * random_unit(params.sample_offset, BOUNDARY_DIMENSION);
     var on = 0u;
-    var known = 0u;
     for (var i = 0u; i < BOUNDARY_POINTS; i++) {
         let distance = radius * splat_kernel_radius((f32(i) + 0.5) / f32(BOUNDARY_POINTS));
         let turn = start + BOUNDARY_GOLDEN_ANGLE * f32(i);
         let offset = distance * vec2f(cos(turn), sin(turn));
-        let state = boundary_at(receiver, receiver.position + offset.x * frame[0] + offset.y * frame[1], slab);
-        known += u32(state != BOUNDARY_UNKNOWN);
-        on += u32(state == BOUNDARY_ON);
+        let y = receiver.position + offset.x * frame[0] + offset.y * frame[1];
+        on += u32(boundary_goes_on(receiver, y, slab));
     }
-    if known == 0u {
-        return 1.0;
-    }
-    return max(f32(on) / f32(known), BOUNDARY_LEAST);
+    return max(f32(on) / f32(BOUNDARY_POINTS), BOUNDARY_LEAST);
 }
 
 @compute @workgroup_size(8, 8)
