@@ -358,10 +358,10 @@ impl OngoingSelection {
         let is_last = self.part + 1 >= interval;
         Some(Work {
             candidates: border(self.part)..border(self.part + 1),
-            step: if is_last {
-                SelectionStep::Maintain
-            } else {
-                SelectionStep::Capture
+            step: match is_last {
+                false => SelectionStep::Capture,
+                true if self.rounds >= MOST_ROUNDS => SelectionStep::Maintain,
+                true => SelectionStep::Settle,
             },
         })
     }
@@ -382,7 +382,7 @@ impl OngoingSelection {
                 }
                 (self.rounds, self.settles_from) = (MOST_ROUNDS, self.tag);
             }
-            SelectionStep::Maintain => self.rounds = self.rounds.saturating_sub(1),
+            SelectionStep::Maintain | SelectionStep::Settle => self.rounds = self.rounds.saturating_sub(1),
         }
         self.part = 0;
         self.tag += 1;

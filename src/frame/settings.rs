@@ -94,8 +94,7 @@ impl Settings {
     /// Smallest cost that still looks right.
     pub fn fast() -> Self {
         Self {
-            photons: 30_000,
-            bounces: 2,
+            photons: 60_000,
             env_map_count: 12,
             env_map_size: 64,
             shadow_map_size: 256,
@@ -105,7 +104,13 @@ impl Settings {
                 ..Default::default()
             },
             trace_method: TraceMethod::OrderedMarch,
-            subsampling: Subsampling::Quarter,
+            splatter: PhotonSplatterSettings {
+                bandwidth: Bandwidth::Density {
+                    photons: 200.0,
+                    clamp: [0.25, 1.0],
+                },
+                ..Default::default()
+            },
             tracer: ImageSpaceTracerSettings {
                 iterations: 5,
                 ..Default::default()
@@ -118,7 +123,7 @@ impl Settings {
     pub fn balanced() -> Self {
         Self {
             frames: 1,
-            photons: 100_000,
+            photons: 500_000,
             bounces: 3,
             env_map_count: 12,
             env_maps_at_lights: 0,
@@ -132,7 +137,7 @@ impl Settings {
             splatter_config: PhotonSplatterConfig::default(),
             splatter: PhotonSplatterSettings::default(),
             radius_alpha: 2.0 / 3.0,
-            subsampling: Subsampling::Half,
+            subsampling: Subsampling::Quarter,
             upsampler: UpsamplerSettings::default(),
         }
     }
@@ -155,7 +160,7 @@ impl Settings {
             subsampling: Subsampling::Full,
             splatter: PhotonSplatterSettings {
                 bandwidth: Bandwidth::Density {
-                    photons: 20.0,
+                    photons: 150.0,
                     clamp: [0.25, 1.0],
                 },
                 ..Default::default()

@@ -208,9 +208,12 @@ pub enum SelectionStep {
     Capture,
     /// Select anew: greedily, then swaps until stable.
     Select,
-    /// One maintenance step of the present selection: drops maps whose places became invalid, adds where more is to be
-    /// seen, tries one swap, and does without a map that is not needed any more.
+    /// One maintenance step of the present selection while geometry moves: drops maps whose places became invalid, adds
+    /// where more is to be seen, and tries one swap. Valid maps that seem to be needed no more are kept: to drop them and
+    /// take them back flickers.
     Maintain,
+    /// The same of geometry that has come to rest, and does without maps that are not needed any more.
+    Settle,
 }
 
 /// The pass.
@@ -525,8 +528,14 @@ impl EnvMapSelector {
         }
         run(&steps.end_steps, 1);
         run(&steps.sum_unseen, count);
-        // By area it would cost as much as all swaps, and maintenance follows.
-        for _ in 0..if by_samples { MOST_SWAPS } else { u32::from(!is_anew) } {
+        let most_dropped = match inputs.step {
+            SelectionStep::Capture | SelectionStep::Maintain => 0,
+            SelectionStep::Select | SelectionStep::Settle if by_samples => MOST_SWAPS,
+            // By area it would cost as much as all swaps, and maintenance follows.
+            SelectionStep::Select => 0,
+            SelectionStep::Settle => 1,
+        };
+        for _ in 0..most_dropped {
             run(&steps.try_without, 1);
             run(&steps.sum_unseen, count);
             run(&steps.keep_if_needed, 1);
