@@ -1,4 +1,4 @@
-// A stable sort of keys with values, one digit of six bits a pass (Harris and Garland 2012 survey such sorts): each block
+// A stable radix sort of keys with values, one digit of six bits a pass (Satish, Harris and Garland 2009): each block
 // of keys counts its digits, the counts are summed over digits and blocks, and each key goes where the sums say, behind
 // those before it of the same digit. Equal keys stay in order, so that the same input gives the same order, always.
 

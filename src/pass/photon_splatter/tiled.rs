@@ -144,7 +144,6 @@ impl Tiled {
             .queue
             .write_buffer(&buffers.params, 0, bytemuck::bytes_of(&params));
         encoder.clear_buffer(&buffers.reach, 0, None);
-        encoder.clear_buffer(&buffers.first_splats, 0, None);
         let view = inputs.g_buffer.view_buffer();
         let label = "lightfall::PhotonSplatter";
         let group = |groups: &mut BindGroupCache, side: &super::sort::Side| {
