@@ -70,9 +70,9 @@ pub struct Settings {
     pub trace_method: TraceMethod,
     /// How far rays are followed. `roulette_from` counts for every kind of tracer.
     pub tracer: ImageSpaceTracerSettings,
-    /// How photons are drawn: tiles in f32, or blended quads.
+    /// How photons are drawn: gathered in f32, or blended.
     pub splatter_config: PhotonSplatterConfig,
-    /// How wide: more photons under a kernel are smoother, blurrier and darker at edges.
+    /// How wide: more photons under a kernel are smoother and blurrier. And what is done at edges.
     pub splatter: PhotonSplatterSettings,
     /// How kernels narrow while frames are accumulated, above 0 and at most 1: their area falls as n^(α − 1), the variance of
     /// the mean as n^(−α), its squared bias as n^(−2(1 − α)). 2/3 is fastest; at 1 radii stay, and so does the bias.

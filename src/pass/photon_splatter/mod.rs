@@ -204,18 +204,15 @@ impl Default for PhotonSplatterSettings {
     }
 }
 
-/// Factor on the radius in the given frame of an accumulation, counted from 0: h² of frame i + 1 is that of frame i times
-/// (i + α) / (i + 1), α in (0, 1] (Knaus and Zwicker 2011, eq. 15). The variance of the mean then falls as n^−α and its
-/// squared bias as n^−2(1 − α): equally fast, and fastest, at α = 2/3. At 1 radii stay.
+/// Factor on the radius in a frame of an accumulation, counted from 0: h² falls from the i-th frame to the next, counted from
+/// 1, by (i + α) / (i + 1), α in (0, 1] (Knaus and Zwicker 2011). The variance of the mean then falls as n^−α and its squared
+/// bias as n^−2(1 − α): equally fast, and fastest, at α = 2/3. At 1 radii stay.
 pub fn progressive_scale(frame: u32, alpha: f32) -> f32 {
-    // The product of (i + α) / (i + 1) is Γ(n + α) / (Γ(α) Γ(n + 1)); up to here it is multiplied out, from there on it falls
-    // as n^(α − 1), to a relative error of 1 / n.
+    // Up to here the product is multiplied out, from there on it falls as n^(α − 1), to a relative error of 1 / n.
     const EXACT: u32 = 4096;
     let alpha = f64::from(alpha);
-    let exact = frame.min(EXACT);
-    let product: f64 = (0..exact)
-        .map(|i| (f64::from(i) + alpha) / (f64::from(i) + 1.0))
-        .product();
+    let step = |i: u32| (f64::from(i) + alpha) / (f64::from(i) + 1.0);
+    let product: f64 = (1..=frame.min(EXACT)).map(step).product();
     let beyond = (f64::from(frame.max(EXACT)) / f64::from(EXACT)).powf(alpha - 1.0);
     (product * beyond).sqrt() as f32
 }
@@ -595,5 +592,26 @@ fn bandwidth(inputs: &PhotonSplatterInputs<'_>) -> gpu::Bandwidth {
         rule,
         max_radius: settings.max_radius.clamp(0.0, LARGEST_RADIUS) * factor as f32,
         factor,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::progressive_scale;
+
+    #[test]
+    fn radii_of_accumulated_frames_shrink_as_they_should() {
+        let area = |frame, alpha| progressive_scale(frame, alpha).powi(2);
+        for alpha in [0.3f32, 2.0 / 3.0, 1.0] {
+            assert_eq!(area(0, alpha), 1.0);
+            let third = (1.0 + alpha) / 2.0 * (2.0 + alpha) / 3.0 * (3.0 + alpha) / 4.0;
+            assert!((area(3, alpha) - third).abs() < 1e-6);
+            // Γ(n + 1 + α) / (Γ(1 + α) Γ(n + 2)): from one frame to one of eight times its number as 8^(α − 1).
+            for frame in [1000, 4096, 40_000] {
+                let ratio = area(8 * frame, alpha) / area(frame, alpha);
+                assert!((ratio / 8f32.powf(alpha - 1.0) - 1.0).abs() < 2e-3, "{alpha}, {frame}: {ratio}");
+            }
+        }
+        assert!(progressive_scale(u32::MAX, 0.5) > 0.0);
     }
 }
