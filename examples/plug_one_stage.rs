@@ -92,6 +92,8 @@ pub(crate) struct IndirectLight {
     pub(crate) photons: Photons,
     pub(crate) irradiance: Irradiance,
     pub(crate) g_buffer: GBuffer,
+    /// How wide kernels are, and what is done at edges.
+    pub(crate) settings: PhotonSplatterSettings,
     area: f32,
     subsampling: Subsampling,
     splatter: PhotonSplatter,
@@ -152,6 +154,7 @@ impl IndirectLight {
             splatter: PhotonSplatter::new(device, &config)?,
             splatter_resources: PhotonSplatterResources::new(device, &config, &photons, estimated)?,
             subsampling,
+            settings: PhotonSplatterSettings::default(),
             upsampling,
             photons,
             g_buffer,
@@ -170,7 +173,7 @@ impl IndirectLight {
             area: self.area,
             radius: self.frame.radius(),
             sample_offset: 0,
-            settings: &PhotonSplatterSettings::default(),
+            settings: &self.settings,
             timestamps: None,
         };
         self.splatter.record(encoder, &mut self.splatter_resources, &inputs);

@@ -309,7 +309,7 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::TONE_MAP, "Params", tone_map::gpu::Params { exposure, curve, inverse_gamma }),
         twin!(wgsl::ENV_MAP_SELECTOR, "Params", env_map_selector::gpu::Params {
             candidate_count, columns, limit, tag, back_face_limit, clearance, tolerance, coverage_target,
-            sample_count,
+            sample_count, least_gain,
         }),
         twin!(wgsl::ENV_MAP_SELECTOR_SAMPLES, "SurfaceSample", env_map_selector::gpu::SurfaceSample { position, normal }),
         twin!(wgsl::ENV_MAP_SELECTOR, "Sight", env_map_selector::gpu::SightRecord {

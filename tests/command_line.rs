@@ -190,7 +190,7 @@ fn images_and_statistics_are_written_whole() {
     let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(path("a.json")).unwrap()).unwrap();
     assert_eq!(stats["size"], serde_json::json!([24, 16]));
     assert_eq!(stats["photons"]["emitted"], 2000);
-    assert_eq!(stats["energy"].as_array().unwrap().len(), 3);
+    assert_eq!(stats["energy"].as_array().unwrap().len(), 4);
     assert!(stats["time"]["frame_ms"]["median"].as_f64().unwrap() > 0.0);
     let bytes = &stats["bytes"];
     let sum: u64 = bytes["by_resource"]
@@ -213,7 +213,8 @@ fn images_and_statistics_are_written_whole() {
             "SoftShadow::test",
             "SoftShadow::search",
             "SoftShadow::blur",
-            "PhotonSplatter",
+            "PhotonSplatter::sort",
+            "PhotonSplatter::finish",
             "Upsampler",
         ] {
             let stage = stages.iter().find(|s| s["name"] == name);

@@ -303,6 +303,8 @@ fn accumulated_frames_are_less_noisy_than_one() {
         },
         // Neighbours are compared, and interpolated ones are alike whatever the noise.
         subsampling: Subsampling::Full,
+        // Noise alone is looked at: radii stay.
+        radius_alpha: 1.0,
         ..small()
     };
     let render = |frames| offline::render(&gpu, &scene, &settings(frames), [48, 48], Component::Indirect).unwrap();

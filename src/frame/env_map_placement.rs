@@ -336,10 +336,11 @@ impl OngoingSelection {
         if !self.is_started {
             self.is_pending = true;
         } else if self.part == 0 {
-            (self.rounds, self.settles_from) = (MOST_ROUNDS, self.tag);
+            // The first round drops no map.
+            (self.rounds, self.settles_from) = (MOST_ROUNDS, self.tag + 1);
         } else {
-            // Part of this round was captured before the change.
-            (self.rounds, self.settles_from) = (MOST_ROUNDS + 1, self.tag + 1);
+            // And part of this round was captured before the change.
+            (self.rounds, self.settles_from) = (MOST_ROUNDS + 1, self.tag + 2);
         }
     }
 

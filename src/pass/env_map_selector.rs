@@ -39,6 +39,7 @@ pub(crate) mod gpu {
         pub(crate) tolerance: f32,
         pub(crate) coverage_target: f32,
         pub(crate) sample_count: u32,
+        pub(crate) least_gain: f32,
     }
 
     /// Twin of `SurfaceSample` in `shaders/common/surface_sample.wgsl`.
@@ -200,6 +201,11 @@ pub struct Selection {
     /// [`EnvMapSelectorInputs::tag`] of the step it came from.
     pub tag: u32,
 }
+
+/// Samples that an exchange of maps has to gain; and while geometry moves, where every exchange is seen as a jump of what
+/// maps do not see well.
+const LEAST_GAIN: f32 = 0.5;
+const LEAST_GAIN_IN_MOTION: f32 = 8.0;
 
 /// What to do with the candidates once they are captured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -456,6 +462,10 @@ impl EnvMapSelector {
                 },
             coverage_target: inputs.settings.coverage_target,
             sample_count: inputs.photons.map_or(0, |_| SAMPLES),
+            least_gain: match inputs.step {
+                SelectionStep::Maintain => LEAST_GAIN_IN_MOTION,
+                _ => LEAST_GAIN,
+            },
         };
         inputs
             .queue

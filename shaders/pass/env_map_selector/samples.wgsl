@@ -77,9 +77,6 @@ fn samples_uncovered(lane: u32) -> vec2f {
     return counts;
 }
 
-// Exchanges that gain less are not worth a map's moving.
-const SAMPLES_LEAST_GAIN: f32 = 0.5;
-
 // What exchanging the map of a bit for a candidate gains; all lanes must call it, with sums up to date.
 fn samples_gain(candidate: u32, bit: u32, lane: u32) -> f32 {
     let others = selection.selected & ~(1u << bit);
@@ -123,7 +120,7 @@ fn exchange_map(@builtin(local_invocation_index) lane: u32) {
     }
     let winner = best_of_lanes(lane, own);
     if lane == 0u {
-        shared_bits = select(selection.selected, 0u, winner.x < SAMPLES_LEAST_GAIN || selection.is_done != 0u);
+        shared_bits = select(selection.selected, 0u, winner.x < params.least_gain || selection.is_done != 0u);
     }
     let candidate = u32(winner.y);
     var best_gain = 0.0;

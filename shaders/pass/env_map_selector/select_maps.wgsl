@@ -19,6 +19,8 @@ struct Params {
     coverage_target: f32,
     // 0: by area
     sample_count: u32,
+    // Exchanges that gain less, in samples, are not worth a map's moving
+    least_gain: f32,
 }
 
 // What one candidate sees.

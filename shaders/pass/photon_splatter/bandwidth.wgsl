@@ -24,6 +24,17 @@ fn bin_density(b: Bandwidth, photon: Photon) -> f32 {
     return f32(count) * cosine / (pixels.x * pixels.y * side * side);
 }
 
+// Radius that is wide enough on the screen; 0 behind the eye.
+fn splat_limit(b: Bandwidth, photon: Photon) -> f32 {
+    let w = dot(matrix_row(3u), vec4f(photon.position, 1.0));
+    return max(0.0, b.max_radius * w / pixels_a_length());
+}
+
+// No kernel of this photon is wider.
+fn splat_widest(b: Bandwidth, photon: Photon) -> f32 {
+    return min(b.scale * inverseSqrt(b.lowest), splat_limit(b, photon));
+}
+
 // Radius of a photon's kernel, unit frame (Yao et al. 2010, section 6, made dimensionless by area and pdf); 0 where nothing
 // is to be drawn.
 fn splat_radius(b: Bandwidth, photon: Photon) -> f32 {
@@ -36,7 +47,6 @@ fn splat_radius(b: Bandwidth, photon: Photon) -> f32 {
     } else if b.rule == BANDWIDTH_BIN {
         h *= inverseSqrt(clamp(bin_density(b, photon) / b.uniform_count, b.lowest, b.highest));
     }
-    let w = dot(matrix_row(3u), vec4f(photon.position, 1.0));
-    h = min(h, max(0.0, b.max_radius * w / pixels_a_length()));
+    h = min(h, splat_limit(b, photon));
     return select(0.0, h, h > 0.0);
 }

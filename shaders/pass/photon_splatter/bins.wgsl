@@ -42,20 +42,32 @@ fn irradiance_point(b: Bandwidth, ndc: vec2f) -> vec2f {
     return (vec2f(0.5 + 0.5 * ndc.x, 0.5 - 0.5 * ndc.y) * vec2f(view.size) - shift) / factor;
 }
 
+// Column and row of a point's bin, before the eye; outside the grid beyond its border.
+fn bin_place(b: Bandwidth, p: vec3f) -> vec2f {
+    let w = dot(matrix_row(3u), vec4f(p, 1.0));
+    let ndc = vec2f(dot(matrix_row(0u), vec4f(p, 1.0)), dot(matrix_row(1u), vec4f(p, 1.0))) / w;
+    return floor(irradiance_point(b, ndc) / f32(BIN)) + f32(BORDER);
+}
+
+fn is_before_eye(p: vec3f) -> bool {
+    return dot(matrix_row(3u), vec4f(p, 1.0)) > 0.0;
+}
+
 // The bin of a point of space; the number of bins where it is in none.
 fn bin_of(b: Bandwidth, p: vec3f) -> u32 {
     let grid = bin_grid(b);
-    let w = dot(matrix_row(3u), vec4f(p, 1.0));
-    if !(w > 0.0) {
+    let place = bin_place(b, p);
+    if !(is_before_eye(p) && all(place >= vec2f(0.0)) && all(place < vec2f(grid))) {
         return grid.x * grid.y;
     }
-    let ndc = vec2f(dot(matrix_row(0u), vec4f(p, 1.0)), dot(matrix_row(1u), vec4f(p, 1.0))) / w;
-    let bin = floor(irradiance_point(b, ndc) / f32(BIN)) + f32(BORDER);
-    if !(all(bin >= vec2f(0.0)) && all(bin < vec2f(grid))) {
-        return grid.x * grid.y;
-    }
-    let at = vec2u(bin);
-    return at.y * grid.x + at.x;
+    return u32(place.y) * grid.x + u32(place.x);
+}
+
+// The same, but that a point beyond the border is in the nearest bin.
+fn nearest_bin(b: Bandwidth, p: vec3f) -> u32 {
+    let grid = bin_grid(b);
+    let place = clamp(bin_place(b, p), vec2f(0.0), vec2f(grid) - 1.0);
+    return select(grid.x * grid.y, u32(place.y) * grid.x + u32(place.x), is_before_eye(p));
 }
 
 // Pixels of the G-buffer that a unit of length at w = 1 covers.

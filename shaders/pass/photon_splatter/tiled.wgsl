@@ -14,6 +14,9 @@
 // Of each bin the widest radius in pixels of the irradiance, rounded up
 @group(0) @binding(7) var<storage, read_write> reach: array<atomic<u32>>;
 
+// Pixels beyond its bin that a photon reaches at most: twice what a ball in the middle of the view may.
+const MOST_REACH: f32 = 48.0;
+
 fn bin_total() -> u32 {
     let grid = bin_grid(params.bandwidth);
     return grid.x * grid.y;
@@ -40,15 +43,22 @@ fn projected_range(row: vec4f, w_row: vec4f, c: vec3f, h: f32) -> vec2f {
     return vec2f(qb - root, qb + root) / qa;
 }
 
-// How far the ball reaches from its centre, in pixels of the irradiance.
-fn pixel_reach(c: vec3f, h: f32) -> f32 {
+// The pixels of the irradiance that a ball may touch: from, to.
+fn ball_pixels(c: vec3f, h: f32) -> vec4f {
     let x = projected_range(matrix_row(0u), matrix_row(3u), c, h);
     let y = projected_range(matrix_row(1u), matrix_row(3u), c, h);
-    let w = dot(matrix_row(3u), vec4f(c, 1.0));
-    let middle = vec2f(dot(matrix_row(0u), vec4f(c, 1.0)), dot(matrix_row(1u), vec4f(c, 1.0))) / w;
-    let scale = 0.5 * vec2f(view.size) / f32(params.bandwidth.factor);
-    let apart = max(abs(vec2f(x.x, y.x) - middle), abs(vec2f(x.y, y.y) - middle)) * scale;
-    return max(apart.x, apart.y);
+    let low = irradiance_point(params.bandwidth, vec2f(x.x, y.y));
+    let high = irradiance_point(params.bandwidth, vec2f(x.y, y.x));
+    let size = vec2f(subsampling_size(view.size, params.bandwidth.factor));
+    return vec4f(max(low, vec2f(0.0)), min(high, size));
+}
+
+// How far they lie beyond a bin.
+fn reach_beyond(bin: u32, pixels: vec4f) -> f32 {
+    let columns = bin_grid(params.bandwidth).x;
+    let start = f32(BIN) * (vec2f(vec2u(bin % columns, bin / columns)) - f32(BORDER));
+    let beyond = max(start - pixels.xy, pixels.zw - start - f32(BIN));
+    return max(max(beyond.x, beyond.y), 0.0);
 }
 
 // Each photon's bin.
@@ -60,8 +70,9 @@ fn find_bins(@builtin(global_invocation_id) id: vec3u) {
     }
     let photon = photons[params.first_slot + index];
     var bin = bin_total();
-    if (photon.state & (PHOTON_STATE_MASK | PHOTON_FIRST_HIT)) == PHOTON_STORED {
-        bin = bin_of(params.bandwidth, photon.position);
+    let pixels = ball_pixels(photon.position, splat_widest(params.bandwidth, photon));
+    if (photon.state & (PHOTON_STATE_MASK | PHOTON_FIRST_HIT)) == PHOTON_STORED && all(pixels.xy < pixels.zw) {
+        bin = nearest_bin(params.bandwidth, photon.position);
     }
     keys[index] = bin;
     slots[index] = index;
@@ -104,18 +115,19 @@ fn prepare_splats(@builtin(global_invocation_id) id: vec3u) {
     }
     let photon = photons[params.first_slot + slots[index]];
     var h = splat_radius(params.bandwidth, photon);
-    var pixels = pixel_reach(photon.position, h);
+    var beyond = reach_beyond(keys[index], ball_pixels(photon.position, h));
     // Near the eye a ball is wider on the screen than its radius at its depth.
-    for (var i = 0u; i < 8u && pixels > f32(BIN * BORDER); i++) {
+    for (var i = 0u; i < 8u && beyond > MOST_REACH; i++) {
         h *= 0.75;
-        pixels = pixel_reach(photon.position, h);
+        beyond = reach_beyond(keys[index], ball_pixels(photon.position, h));
     }
-    if !(h > 0.0) || pixels > f32(BIN * BORDER) {
+    if !(h > 0.0) || beyond > MOST_REACH {
         splats[index] = splat_nothing();
         return;
     }
     let inverse = 1.0 / (h * h);
     splats[index] = Splat(photon.position, inverse, photon.flux * inverse, photon.normal);
-    atomicMax(&reach[keys[index]], u32(ceil(pixels)));
-    atomicMax(&reach[bins], u32(ceil(pixels)));
+    // A pixel of slack for rounding.
+    atomicMax(&reach[keys[index]], u32(ceil(beyond)) + 1u);
+    atomicMax(&reach[bins], u32(ceil(beyond)) + 1u);
 }

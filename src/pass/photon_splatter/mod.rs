@@ -609,7 +609,10 @@ mod tests {
             // Γ(n + 1 + α) / (Γ(1 + α) Γ(n + 2)): from one frame to one of eight times its number as 8^(α − 1).
             for frame in [1000, 4096, 40_000] {
                 let ratio = area(8 * frame, alpha) / area(frame, alpha);
-                assert!((ratio / 8f32.powf(alpha - 1.0) - 1.0).abs() < 2e-3, "{alpha}, {frame}: {ratio}");
+                assert!(
+                    (ratio / 8f32.powf(alpha - 1.0) - 1.0).abs() < 2e-3,
+                    "{alpha}, {frame}: {ratio}"
+                );
             }
         }
         assert!(progressive_scale(u32::MAX, 0.5) > 0.0);
