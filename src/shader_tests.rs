@@ -714,9 +714,10 @@ fn kinds_of_hits_are_the_same_on_both_sides() {
 
 #[test]
 fn bins_are_the_same_on_both_sides() {
-    use photon_splatter::{BIN, BORDER, tiled::TILE};
+    use photon_splatter::{BIN, BORDER, tiled::SPLATS_A_TURN, tiled::TILE};
     let shader = Shader::new("PhotonSplatter gather", wgsl::PHOTON_SPLATTER_GATHER);
     assert_eq!(shader.constant("TILE"), Literal::U32(TILE));
+    assert_eq!(shader.constant("SPLATS_A_TURN"), Literal::U32(SPLATS_A_TURN));
     assert_eq!(shader.constant("BIN"), Literal::U32(BIN));
     assert_eq!(shader.constant("BORDER"), Literal::U32(BORDER));
 }

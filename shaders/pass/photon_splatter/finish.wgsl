@@ -14,8 +14,8 @@ struct FinishParams {
 @group(0) @binding(3) var normal_texture: texture_2d<f32>;
 @group(0) @binding(4) var base_color_texture: texture_2d<f32>;
 @group(0) @binding(5) var receivers: texture_2d<u32>;
-// rgb: irradiance, a: its channels by the radii of the kernels that brought it
-@group(0) @binding(6) var sums: texture_2d<f32>;
+// A layer for each part of the photons. rgb: irradiance, a: its channels by the radii of the kernels that brought it
+@group(0) @binding(6) var sums: texture_2d_array<f32>;
 @group(0) @binding(7) var irradiance: texture_storage_2d<rgba32float, write>;
 
 // Points of the disc that are looked at, as densely as the kernel weighs.
@@ -82,7 +82,10 @@ fn finish_pixels(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let receiver = receiver_unpack(textureLoad(receivers, id.xy, 0));
-    let sum = textureLoad(sums, id.xy, 0);
+    var sum = vec4f(0.0);
+    for (var part = 0u; part < textureNumLayers(sums); part++) {
+        sum += textureLoad(sums, id.xy, part, 0);
+    }
     let light = sum.x + sum.y + sum.z;
     var share = 1.0;
     if params.is_corrected == 1u && receiver.is_seen && light > 0.0 {

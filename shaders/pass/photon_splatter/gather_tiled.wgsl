@@ -6,11 +6,14 @@
 @group(0) @binding(3) var<storage, read> first_splats: array<u32>;
 @group(0) @binding(4) var<storage, read> reach: array<u32>;
 @group(0) @binding(5) var receivers: texture_2d<u32>;
-@group(0) @binding(6) var sums: texture_storage_2d<rgba32float, write>;
+// A layer for each part of the photons
+@group(0) @binding(6) var sums: texture_storage_2d_array<rgba32float, write>;
 
 // Pixels along the side of what a workgroup gathers: 2 x 2 blocks of 8 x 8, of which each invocation has 2 x 2.
 const TILE: u32 = 16u;
 const BLOCK: u32 = 8u;
+// Photons added up in a turn of the loop. Twin of `SPLATS_A_TURN`.
+const SPLATS_A_TURN: u32 = 16u;
 
 // Four receivers by coordinate, and what they have gathered.
 struct Gathered {
@@ -60,7 +63,11 @@ fn gap(corner: u32, bin: i32) -> i32 {
 }
 
 @compute @workgroup_size(64)
-fn gather_tiles(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+fn gather_tiles(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
     let block = lane / 16u;
     let corner = TILE * group.xy + BLOCK * vec2u(block % 2u, block / 2u);
     let own = corner + 2u * vec2u(lane % 4u, (lane / 4u) % 4u);
@@ -88,9 +95,10 @@ fn gather_tiles(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
             if i32(reach[bin]) <= gap {
                 continue;
             }
-            let last = first_splats[bin + 1u];
-            // Many at a turn: a software adapter ends a shader's loops after some 65 000 turns in all.
-            for (var i = first_splats[bin]; i < last; i += 16u) {
+            // This workgroup's part of the bin.
+            let count = first_splats[bin + 1u] - first_splats[bin];
+            let last = first_splats[bin] + count * (group.z + 1u) / groups.z;
+            for (var i = first_splats[bin] + count * group.z / groups.z; i < last; i += SPLATS_A_TURN) {
                 add_four(&g, i, last - 1u);
                 add_four(&g, i + 4u, last - 1u);
                 add_four(&g, i + 8u, last - 1u);
@@ -101,7 +109,7 @@ fn gather_tiles(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
     for (var i = 0u; i < 4u; i++) {
         let pixel = own + vec2u(i % 2u, i / 2u);
         if all(pixel < size) {
-            textureStore(sums, pixel, vec4f(g.red[i], g.green[i], g.blue[i], g.radius[i]));
+            textureStore(sums, pixel, group.z, vec4f(g.red[i], g.green[i], g.blue[i], g.radius[i]));
         }
     }
 }

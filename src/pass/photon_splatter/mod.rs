@@ -71,7 +71,7 @@ pub(crate) const FINISH_SLOTS: [Slot; 8] = [
     Slot::Texture,
     Slot::Texture,
     Slot::UintTexture,
-    Slot::Texture,
+    Slot::TextureArray,
     Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
 ];
 
@@ -260,7 +260,10 @@ pub struct PhotonSplatterResources {
     receiver_params: wgpu::Buffer,
     finish_params: wgpu::Buffer,
     receivers: wgpu::TextureView,
+    /// A layer for each part of the photons.
     sums: wgpu::TextureView,
+    /// The first of them.
+    first_sum: wgpu::TextureView,
     shape: ShapeBuffers,
     groups: [BindGroupCache; 2],
     bytes: u64,
@@ -386,7 +389,7 @@ impl PhotonSplatter {
                 tiled.record(&self.device, encoder, buffers, inputs, &bandwidth, targets);
             }
             (Shape::Raster(raster), ShapeBuffers::Raster(buffers)) => {
-                let targets = (&resources.receivers, &resources.sums);
+                let targets = (&resources.receivers, &resources.first_sum);
                 raster.record(&self.device, encoder, buffers, inputs, &bandwidth, targets);
             }
             // Resources of another shape: nothing is estimated.
@@ -472,12 +475,13 @@ impl PhotonSplatterResources {
     /// Bytes of working memory for photon buffers of `slots` slots, hop 0 not counted, and irradiance of `size`.
     pub fn size_in_bytes(config: &PhotonSplatterConfig, slots: u32, size: [u32; 2]) -> u64 {
         let params = size_of::<gpu::ReceiverParams>() + size_of::<gpu::FinishParams>();
-        let textures = [RECEIVER_FORMAT, config.sum_format()].map(|format| device::texture_bytes(size, 1, format));
+        let textures = device::texture_bytes(size, 1, RECEIVER_FORMAT)
+            + device::texture_bytes(size, sum_layers(config, slots), config.sum_format());
         let shape = match config.shape {
             SplatShape::Tiled => TiledBuffers::size_in_bytes(slots, size),
             SplatShape::Quads | SplatShape::Volumes => RasterBuffers::size_in_bytes(size),
         };
-        params as u64 + textures.iter().sum::<u64>() + shape
+        params as u64 + textures + shape
     }
 
     /// Whether working memory for this many paths and bounces fits the device, without making it.
@@ -503,15 +507,15 @@ impl PhotonSplatterResources {
         size: [u32; 2],
     ) -> Result<Self, Error> {
         use wgpu::TextureUsages as U;
-        let texture = |label, format, usage| {
+        let texture = |label, layers, format, usage| {
             let spec = TextureSpec {
                 label,
                 size,
-                layers: 1,
+                layers,
                 format,
                 usage: usage | U::TEXTURE_BINDING,
             };
-            Ok::<_, Error>(device::texture(device, &spec)?.create_view(&Default::default()))
+            device::texture(device, &spec)
         };
         let slots = splatted_slots(photons);
         let (shape, sum_usage) = match config.shape {
@@ -526,8 +530,15 @@ impl PhotonSplatterResources {
         };
         let receivers = texture(
             "lightfall::PhotonSplatter::receivers",
+            1,
             RECEIVER_FORMAT,
             U::STORAGE_BINDING,
+        )?;
+        let sums = texture(
+            "lightfall::PhotonSplatter::sums",
+            sum_layers(config, slots),
+            config.sum_format(),
+            sum_usage,
         )?;
         Ok(Self {
             receiver_params: device::uniform_buffer::<gpu::ReceiverParams>(
@@ -538,8 +549,9 @@ impl PhotonSplatterResources {
                 device,
                 "lightfall::PhotonSplatter::finish_params",
             )?,
-            receivers,
-            sums: texture("lightfall::PhotonSplatter::sums", config.sum_format(), sum_usage)?,
+            receivers: receivers.create_view(&Default::default()),
+            sums: device::array_view(&sums),
+            first_sum: device::layer_view(&sums, 0),
             shape,
             groups: Default::default(),
             bytes: Self::size_in_bytes(config, slots, size),
@@ -549,6 +561,14 @@ impl PhotonSplatterResources {
     /// Bytes allocated.
     pub fn memory_use(&self) -> u64 {
         self.bytes
+    }
+}
+
+/// Layers of the sums.
+fn sum_layers(config: &PhotonSplatterConfig, slots: u32) -> u32 {
+    match config.shape {
+        SplatShape::Tiled => tiled::parts(slots),
+        SplatShape::Quads | SplatShape::Volumes => 1,
     }
 }
 

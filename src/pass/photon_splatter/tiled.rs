@@ -51,11 +51,22 @@ pub(crate) const GATHER_SLOTS: [Slot; 7] = [
     Slot::Storage,
     Slot::Storage,
     Slot::UintTexture,
-    Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
+    Slot::StorageArray(wgpu::TextureFormat::Rgba32Float),
 ];
 
 /// Pixels along the side of what a workgroup gathers. Twin of `TILE` in `gather_tiled.wgsl`.
 pub(crate) const TILE: u32 = 16;
+
+/// Photons that are added up in a turn of the gather's loop. Twin of `SPLATS_A_TURN`.
+pub(crate) const SPLATS_A_TURN: u32 = 16;
+
+/// Turns that an invocation may take: llvmpipe ends a shader's loops after 65 535 in all.
+const MOST_TURNS: u32 = 60_000;
+
+/// Parts that photons are gathered in, each into a layer of the sums.
+pub(super) fn parts(slots: u32) -> u32 {
+    slots.div_ceil(MOST_TURNS * SPLATS_A_TURN).max(1)
+}
 
 /// Its pipelines.
 #[derive(Debug)]
@@ -189,7 +200,7 @@ impl Tiled {
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.gather);
         pass.set_bind_group(0, &gathering, &[]);
-        pass.dispatch_workgroups(size[0].div_ceil(TILE), size[1].div_ceil(TILE), 1);
+        pass.dispatch_workgroups(size[0].div_ceil(TILE), size[1].div_ceil(TILE), parts(buffers.slots));
     }
 }
 
