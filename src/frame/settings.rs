@@ -100,7 +100,6 @@ impl Settings {
             shadow_map_size: 256,
             selector: EnvMapSelectorSettings {
                 candidates: 40,
-                coverage_target: 0.99,
                 ..Default::default()
             },
             trace_method: TraceMethod::OrderedMarch,
