@@ -24,6 +24,11 @@ fn photon_gone(state: u32, flux: vec3f, direction: vec3f, light: u32) -> Photon 
     return Photon(vec3f(0.0), state, flux, 0.0, 0u, octahedral_pack(direction), 0u, light);
 }
 
+// Whether it counts in density estimation: it arrived at a surface, and not straight from its light.
+fn photon_is_splatted(state: u32) -> bool {
+    return (state & (PHOTON_STATE_MASK | PHOTON_FIRST_HIT)) == PHOTON_STORED;
+}
+
 // Whether a surer tracer should walk the hop again.
 fn photon_is_unresolved(state: u32) -> bool {
     return (state & PHOTON_STATE_MASK) == PHOTON_LOST || (state & PHOTON_TENTATIVE) != 0u;

@@ -38,7 +38,7 @@ fn splat_widest(b: Bandwidth, photon: Photon) -> f32 {
 // Radius of a photon's kernel, unit frame (Yao et al. 2010, section 6, made dimensionless by area and pdf); 0 where nothing
 // is to be drawn.
 fn splat_radius(b: Bandwidth, photon: Photon) -> f32 {
-    if (photon.state & (PHOTON_STATE_MASK | PHOTON_FIRST_HIT)) != PHOTON_STORED {
+    if !photon_is_splatted(photon.state) {
         return 0.0;
     }
     var h = b.scale;

@@ -12,7 +12,7 @@ fn count_bins(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let photon = photons[params.first_slot + index];
-    if (photon.state & (PHOTON_STATE_MASK | PHOTON_FIRST_HIT)) == PHOTON_STORED {
+    if photon_is_splatted(photon.state) {
         let grid = bin_grid(params.bandwidth);
         let bin = bin_of(params.bandwidth, photon.position);
         if bin < grid.x * grid.y {

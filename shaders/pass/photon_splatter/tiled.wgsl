@@ -71,7 +71,7 @@ fn find_bins(@builtin(global_invocation_id) id: vec3u) {
     let photon = photons[params.first_slot + index];
     var bin = bin_total();
     let pixels = ball_pixels(photon.position, splat_widest(params.bandwidth, photon));
-    if (photon.state & (PHOTON_STATE_MASK | PHOTON_FIRST_HIT)) == PHOTON_STORED && all(pixels.xy < pixels.zw) {
+    if photon_is_splatted(photon.state) && all(pixels.xy < pixels.zw) {
         bin = nearest_bin(params.bandwidth, photon.position);
     }
     keys[index] = bin;
