@@ -183,7 +183,9 @@ impl IndirectLight {
                 g_buffer: &self.g_buffer,
                 coarse: &upsampling.coarse,
                 subsampling: self.subsampling,
+                target: Subsampling::Full,
                 irradiance: &self.irradiance,
+                marked: None,
                 settings: &UpsamplerSettings::default(),
                 timestamps: None,
             };

@@ -490,6 +490,7 @@ fn report(
             "used": offline.renderer.env_maps().map_or(0, |m| m.centers().len()),
             "coverage": offline.renderer.env_map_coverage(),
         },
+        "reestimated": offline.reestimated().map_err(|e| e.to_string())?,
         "bytes": {
             "total": by_resource.iter().map(|r| r.1).sum::<u64>(),
             "by_resource": by_resource.into_iter().collect::<std::collections::BTreeMap<_, _>>(),

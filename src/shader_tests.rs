@@ -294,7 +294,12 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::PHOTON_SPLATTER_FINISH, "FinishParams", photon_splatter::gpu::FinishParams {
             factor, is_corrected, sample_offset,
         }),
-        twin!(wgsl::UPSAMPLER, "Params", upsampler::gpu::Params { factor, normal_agreement, plane_distance }),
+        twin!(wgsl::UPSAMPLER, "Params", upsampler::gpu::Params {
+            factor, target_factor, normal_agreement, plane_distance, disagreement, is_marking
+        }),
+        twin!(wgsl::PHOTON_SPLATTER_MARKED, "MarkedParams", tiled::gpu::MarkedParams {
+            bandwidth, factor, is_corrected, sample_offset
+        }),
         twin!(wgsl::DIRECT_LIGHT, "Params", direct_light::gpu::Params { light_count, shadow_map_size }),
         twin!(wgsl::NEAREST_OCCLUDER, "Params", nearest_occluder::gpu::Params {
             light_count, shadow_map_size, layer_count,
@@ -426,6 +431,7 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "PhotonSplatter tiled" => vec![&tiled::TILED_SLOTS],
         "PhotonSplatter sort" => vec![&sort::SORT_SLOTS],
         "PhotonSplatter gather" => vec![&tiled::GATHER_SLOTS],
+        "PhotonSplatter marked" => vec![&tiled::MARKED_SLOTS],
         "PhotonSplatter bins" => vec![&raster::BIN_SLOTS],
         "PhotonSplatter quads" | "PhotonSplatter volumes" => vec![&raster::RASTER_SLOTS],
         "PhotonSplatter finish" => vec![&photon_splatter::FINISH_SLOTS],
@@ -714,10 +720,9 @@ fn kinds_of_hits_are_the_same_on_both_sides() {
 
 #[test]
 fn bins_are_the_same_on_both_sides() {
-    use photon_splatter::{BIN, BORDER, tiled::SPLATS_A_TURN, tiled::TILE};
+    use photon_splatter::{BIN, BORDER, tiled::TILE};
     let shader = Shader::new("PhotonSplatter gather", wgsl::PHOTON_SPLATTER_GATHER);
     assert_eq!(shader.constant("TILE"), Literal::U32(TILE));
-    assert_eq!(shader.constant("SPLATS_A_TURN"), Literal::U32(SPLATS_A_TURN));
     assert_eq!(shader.constant("BIN"), Literal::U32(BIN));
     assert_eq!(shader.constant("BORDER"), Literal::U32(BORDER));
 }

@@ -134,6 +134,7 @@ pub(crate) const BVH_TRACER_RAYS: &str = compose![
 
 pub(crate) const PHOTON_SPLATTER_RECEIVERS: &str = compose![
     "pass/photon_splatter/find_receivers.wgsl",
+    "pass/photon_splatter/receiver_at.wgsl",
     "pass/photon_splatter/receiver.wgsl",
     "common/g_buffer.wgsl",
     "common/subsampling.wgsl",
@@ -155,6 +156,7 @@ pub(crate) const PHOTON_SPLATTER_SORT: &str = compose!["pass/photon_splatter/sor
 
 pub(crate) const PHOTON_SPLATTER_GATHER: &str = compose![
     "pass/photon_splatter/gather_tiled.wgsl",
+    "pass/photon_splatter/gather.wgsl",
     "pass/photon_splatter/tiled_splat.wgsl",
     "pass/photon_splatter/bins.wgsl",
     "pass/photon_splatter/splat.wgsl",
@@ -162,6 +164,25 @@ pub(crate) const PHOTON_SPLATTER_GATHER: &str = compose![
     "common/g_buffer.wgsl",
     "common/subsampling.wgsl",
     "common/octahedral.wgsl",
+];
+
+pub(crate) const PHOTON_SPLATTER_MARKED: &str = compose![
+    "pass/photon_splatter/gather_marked.wgsl",
+    "pass/photon_splatter/gather.wgsl",
+    "pass/photon_splatter/tiled_splat.wgsl",
+    "pass/photon_splatter/bins.wgsl",
+    "pass/photon_splatter/boundary.wgsl",
+    "pass/photon_splatter/splat.wgsl",
+    "pass/photon_splatter/receiver_at.wgsl",
+    "pass/photon_splatter/receiver.wgsl",
+    "common/marked_pixels.wgsl",
+    "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
+    "common/octahedral.wgsl",
+    "common/sampling.wgsl",
+    "common/random.wgsl",
+    "common/halton.wgsl",
+    "common/hash.wgsl",
 ];
 
 pub(crate) const PHOTON_SPLATTER_BINS: &str = compose![
@@ -206,6 +227,7 @@ pub(crate) const PHOTON_SPLATTER_VOLUMES: &str = compose![
 
 pub(crate) const PHOTON_SPLATTER_FINISH: &str = compose![
     "pass/photon_splatter/finish.wgsl",
+    "pass/photon_splatter/boundary.wgsl",
     "pass/photon_splatter/splat.wgsl",
     "pass/photon_splatter/receiver.wgsl",
     "common/g_buffer.wgsl",
@@ -219,6 +241,7 @@ pub(crate) const PHOTON_SPLATTER_FINISH: &str = compose![
 
 pub(crate) const UPSAMPLER: &str = compose![
     "pass/upsampler.wgsl",
+    "common/marked_pixels.wgsl",
     "common/g_buffer.wgsl",
     "common/subsampling.wgsl",
     "common/octahedral.wgsl",
@@ -368,6 +391,7 @@ pub const MODULES: &[(&str, &str)] = &[
     ("PhotonSplatter tiled", PHOTON_SPLATTER_TILED),
     ("PhotonSplatter sort", PHOTON_SPLATTER_SORT),
     ("PhotonSplatter gather", PHOTON_SPLATTER_GATHER),
+    ("PhotonSplatter marked", PHOTON_SPLATTER_MARKED),
     ("PhotonSplatter bins", PHOTON_SPLATTER_BINS),
     ("PhotonSplatter quads", PHOTON_SPLATTER_QUADS),
     ("PhotonSplatter volumes", PHOTON_SPLATTER_VOLUMES),
@@ -396,6 +420,7 @@ pub const MODULES: &[(&str, &str)] = &[
 pub const COMMON: &str = compose![
     "common/depth_range.wgsl",
     "common/lost_rays.wgsl",
+    "common/marked_pixels.wgsl",
     "common/photon.wgsl",
     "common/subsampling.wgsl",
     "common/octahedral.wgsl",

@@ -334,7 +334,9 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
         g_buffer: &g_buffer,
         coarse: &coarse,
         subsampling: settings.subsampling,
+        target: Subsampling::Full,
         irradiance: &indirect,
+        marked: None,
         settings: &settings.upsampler,
         timestamps,
     };

@@ -179,7 +179,9 @@ fn upsample_into(
         g_buffer,
         coarse,
         subsampling,
+        target: Subsampling::Full,
         irradiance: &fine,
+        marked: None,
         settings,
         timestamps: None,
     };

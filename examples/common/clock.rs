@@ -2,12 +2,14 @@
 
 use super::adapter::Gpu;
 use super::offline::Offline;
-use lightfall::{Error, Timestamps};
+use lightfall::{Error, Timestamps, wgpu};
 
 /// Renders frames and keeps their times: of GPU timestamps where the device has them, else on the wall. A stage that runs
-/// in some frames only counts for its share.
+/// in some frames only counts for its share. Of a software adapter frames are timed on the wall all the same: it writes
+/// timestamps when it comes to a pass, not when the work before is done.
 pub(crate) struct Clock {
     timestamps: Option<Timestamps>,
+    is_software: bool,
     /// Steady-state frames only: the first one also compiles and allocates.
     frames_ms: Vec<f64>,
     stages: Vec<(&'static str, Vec<f64>)>,
@@ -18,15 +20,20 @@ impl Clock {
     pub(crate) fn new(gpu: &Gpu) -> Self {
         Self {
             timestamps: Timestamps::new(&gpu.device).ok(),
+            is_software: gpu.info.device_type == wgpu::DeviceType::Cpu,
             frames_ms: Vec::new(),
             stages: Vec::new(),
             seen_first: false,
         }
     }
 
-    /// What the times are taken with: "gpu" or "wall".
+    /// What the times of frames are taken with: "gpu" or "wall".
     pub(crate) fn kind(&self) -> &'static str {
-        if self.timestamps.is_some() { "gpu" } else { "wall" }
+        if self.is_on_gpu() { "gpu" } else { "wall" }
+    }
+
+    fn is_on_gpu(&self) -> bool {
+        self.timestamps.is_some() && !self.is_software
     }
 
     /// Renders the next frame.
@@ -51,7 +58,7 @@ impl Clock {
             self.seen_first = true;
             return Ok(());
         }
-        self.frames_ms.push(if self.timestamps.is_some() {
+        self.frames_ms.push(if self.is_on_gpu() {
             stages.iter().map(|s| s.1).sum()
         } else {
             wall_ms

@@ -6,7 +6,7 @@ use lightfall::pass::{
     Accumulator, AccumulatorInputs, AccumulatorResources, CompositeSettings, HopStatistics, TraceStatistics,
     TraceStatisticsInputs, TraceStatisticsResources,
 };
-use lightfall::resource::{BvhGeometry, BvhGeometryConfig, CameraView, Geometry, MeshGeometry, Radiance};
+use lightfall::resource::{BvhGeometry, BvhGeometryConfig, CameraView, Geometry, MarkedPixels, MeshGeometry, Radiance};
 use lightfall::scene::{Scene, SceneSummary};
 use lightfall::{Error, Timestamps, wgpu};
 
@@ -191,6 +191,16 @@ impl<'a> Offline<'a> {
         pass.record(&mut encoder, &mut resources, &inputs);
         queue.submit([encoder.finish()]);
         resources.read_blocking(device, queue)
+    }
+
+    /// Of each level of up-sampling, from coarse to fine, the share of its pixels that the last frame estimated anew.
+    pub(crate) fn reestimated(&self) -> Result<Vec<f64>, Error> {
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        let share = |marked: &MarkedPixels| {
+            let [width, height] = marked.size().map(f64::from);
+            Ok(marked.count_blocking(device, queue)? as f64 / (width * height))
+        };
+        self.view.marked_pixels().map(share).collect()
     }
 
     /// Bytes of GPU memory, by resource.

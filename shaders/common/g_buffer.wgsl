@@ -10,6 +10,19 @@ struct View {
     normal_encoding: u32,
 }
 
+// Row i of the matrix that takes positions to clip space.
+fn g_buffer_row(view: View, i: u32) -> vec4f {
+    let m = view.view_projection;
+    return vec4f(m[0][i], m[1][i], m[2][i], m[3][i]);
+}
+
+// Pixels that a unit of length at w = 1 covers.
+fn g_buffer_pixels_a_length(view: View) -> f32 {
+    let x_scale = length(g_buffer_row(view, 0u).xyz) * f32(view.size.x);
+    let y_scale = length(g_buffer_row(view, 1u).xyz) * f32(view.size.y);
+    return 0.5 * max(x_scale, y_scale);
+}
+
 // Unit-frame position of a pixel's centre at this depth.
 fn g_buffer_position(view: View, pixel: vec2f, depth: f32) -> vec3f {
     let uv = (pixel + 0.5) / vec2f(view.size);

@@ -2,11 +2,17 @@
 // image-space photon mapping, section 3.5), with the distance from the receiver's tangent plane in the place of depth.
 
 struct Params {
+    // Pixels of the G-buffer along each axis for a sample, and for a pixel of what is made of them
     factor: u32,
+    target_factor: u32,
     // Cosine at and below which normals do not agree
     normal_agreement: f32,
     // Distance from the receiver's plane that counts as off it, in receiver-to-sample distances as seen on the screen
     plane_distance: f32,
+    // Difference of samples, over their mean, above which what lies between them is marked
+    disagreement: f32,
+    // 1: pixels are marked
+    is_marking: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -16,6 +22,7 @@ struct Params {
 @group(0) @binding(4) var base_color_texture: texture_2d<f32>;
 @group(0) @binding(5) var coarse: texture_2d<f32>;
 @group(0) @binding(6) var irradiance: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(7) var<storage, read_write> marked: array<u32>;
 
 // Positions come from f32 depths through an f32 matrix: some ten roundings of 2^-24 of the numbers involved, which are of
 // the order of the region's radius (at most 1) or of the distance to the eye.
@@ -23,6 +30,8 @@ const ROUNDING: f32 = 0x1p-20;
 // Misfits of samples without a surface, and of those whose misfit is no number.
 const UNSEEN: f32 = 3e38;
 const WORST: f32 = 1e38;
+// Where the samples that fit weigh less than this together, of 1, they lie to one side.
+const LEAST_FIT: f32 = 0.25;
 
 // A pixel and the surface element that it sees.
 struct Receiver {
@@ -64,11 +73,6 @@ fn mean_with(mean: Mean, value: vec3f, weight: f32) -> Mean {
     return Mean(mean.value + min(1.0, weight / total) * (value - mean.value), total);
 }
 
-fn matrix_row(i: u32) -> vec4f {
-    let m = view.view_projection;
-    return vec4f(m[0][i], m[1][i], m[2][i], m[3][i]);
-}
-
 fn position_at(pixel: vec2u) -> vec3f {
     return g_buffer_position(view, vec2f(pixel), textureLoad(depth_texture, pixel + view.origin, 0).r);
 }
@@ -92,10 +96,8 @@ fn receiver_at(pixel: vec2u) -> Receiver {
         position_at(vec2u(pixel.x, min(pixel.y + 1u, limit.y))),
     );
     let normal = g_buffer_geometric_normal(view, vec2i(pixel), p, around, shading);
-    let w = dot(matrix_row(3u), vec4f(p, 1.0));
-    let x_scale = length(matrix_row(0u).xyz) * f32(view.size.x);
-    let y_scale = length(matrix_row(1u).xyz) * f32(view.size.y);
-    return Receiver(pixel, p, shading, normal, w, 2.0 * w / max(x_scale, y_scale));
+    let w = dot(g_buffer_row(view, 3u), vec4f(p, 1.0));
+    return Receiver(pixel, p, shading, normal, w, w / g_buffer_pixels_a_length(view));
 }
 
 // The sample of this index as the receiver sees it.
@@ -116,42 +118,58 @@ fn sample_for(receiver: Receiver, index: vec2u) -> Sample {
     let lifted = off_plane / (params.plane_distance * distance + ROUNDING * (1.0 + receiver.w));
     let misfit = turned + lifted;
     // What is linear on a plane in space is linear on the screen only over w: weights of 1 / w interpolate it exactly.
-    let perspective = receiver.w / dot(matrix_row(3u), vec4f(p, 1.0));
+    let perspective = receiver.w / dot(g_buffer_row(view, 3u), vec4f(p, 1.0));
     let fit = perspective * max(0.0, 1.0 - turned) * max(0.0, 1.0 - lifted);
     return Sample(textureLoad(coarse, index, 0).rgb, fit, select(WORST, misfit, misfit < WORST));
 }
 
-@compute @workgroup_size(8, 8)
-fn upsample_pixels(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= min(view.size, textureDimensions(irradiance))) {
-        return;
+struct Estimate {
+    irradiance: vec3f,
+    // 1 where samples fit
+    fits: f32,
+    is_marked: bool,
+}
+
+// Whether four samples leave open what lies between them: too few fit, or they say too different things.
+fn is_in_doubt(total: f32, low: f32, high: f32) -> bool {
+    return total < LEAST_FIT || high - low > 0.5 * params.disagreement * (low + high);
+}
+
+fn estimate_at(id: vec2u) -> Estimate {
+    let pixel_at = subsampling_pixel(id, params.target_factor, view.size);
+    if !is_surface(pixel_at) {
+        return Estimate(vec3f(0.0), 0.0, false);
     }
-    if !is_surface(id.xy) {
-        textureStore(irradiance, id.xy, vec4f(0.0));
-        return;
-    }
-    let receiver = receiver_at(id.xy);
+    let receiver = receiver_at(pixel_at);
     let factor = i32(params.factor);
     let last = vec2i(min(subsampling_size(view.size, params.factor), textureDimensions(coarse))) - 1;
     // The four samples around the pixel. The last ones of an axis may stand closer; outside the outermost, they count alone.
-    let pixel = vec2i(id.xy);
+    let pixel = vec2i(pixel_at);
     let low = clamp((pixel - factor / 2 + factor) / factor - 1, vec2i(0), last);
     let high = min(low + 1, last);
     let start = vec2i(subsampling_pixel(vec2u(low), params.factor, view.size));
     let end = vec2i(subsampling_pixel(vec2u(high), params.factor, view.size));
     let t = clamp(vec2f(pixel - start) / vec2f(max(end - start, vec2i(1))), vec2f(0.0), vec2f(1.0));
     var mean = Mean();
+    // Sum of the channels: the least and the most that a sample says.
+    var least = 3e38;
+    var most = 0.0;
     for (var i = 0; i < 4; i++) {
         let right_or_below = vec2<bool>((i & 1) == 1, (i & 2) == 2);
         let share = select(1.0 - t, t, right_or_below);
         if share.x * share.y > 0.0 {
             let s = sample_for(receiver, vec2u(select(low, high, right_or_below)));
-            mean = mean_with(mean, s.irradiance, share.x * share.y * s.fit);
+            let weight = share.x * share.y * s.fit;
+            mean = mean_with(mean, s.irradiance, weight);
+            if weight > 0.0 {
+                let light = s.irradiance.r + s.irradiance.g + s.irradiance.b;
+                least = min(least, light);
+                most = max(most, light);
+            }
         }
     }
     if mean.weight > 0.0 {
-        textureStore(irradiance, id.xy, vec4f(mean.value, 1.0));
-        return;
+        return Estimate(mean.value, 1.0, is_in_doubt(mean.weight, least, most));
     }
     // None of them fits: the sixteen around, falling off linearly to twice the distance between samples.
     var best = Sample(vec3f(0.0), 0.0, UNSEEN);
@@ -169,8 +187,32 @@ fn upsample_pixels(@builtin(global_invocation_id) id: vec3u) {
         }
     }
     if mean.weight > 0.0 {
-        textureStore(irradiance, id.xy, vec4f(mean.value, 1.0));
-    } else {
-        textureStore(irradiance, id.xy, vec4f(best.irradiance, 0.0));
+        return Estimate(mean.value, 1.0, true);
+    }
+    return Estimate(best.irradiance, 0.0, true);
+}
+
+var<workgroup> marks: array<atomic<u32>, 2>;
+
+@compute @workgroup_size(8, 8)
+fn upsample_pixels(
+    @builtin(global_invocation_id) id: vec3u,
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let size = subsampling_size(view.size, params.target_factor);
+    if all(id.xy < min(size, textureDimensions(irradiance))) {
+        let estimate = estimate_at(id.xy);
+        textureStore(irradiance, id.xy, vec4f(estimate.irradiance, estimate.fits));
+        if estimate.is_marked {
+            atomicOr(&marks[lane / 32u], 1u << (lane % 32u));
+        }
+    }
+    workgroupBarrier();
+    if params.is_marking == 1u && lane == 0u {
+        let words = vec2u(atomicLoad(&marks[0]), atomicLoad(&marks[1]));
+        let word = marked_word(group.xy, marked_blocks(size));
+        marked[word] = words.x;
+        marked[word + 1u] = words.y;
     }
 }

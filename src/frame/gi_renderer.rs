@@ -8,19 +8,19 @@
 use super::env_map_placement::{EnvMapPlacement, PHOTON_ROUNDS, PlacementInputs, SelectionContext, Work};
 use super::indirect_scene::{IndirectScene, PhotonInputs, PhotonPasses};
 use super::recapture::Recapture;
-use super::{Plan, Settings, Stage};
+use super::{Plan, Settings, Stage, Upsampling};
 use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, CoverageMeasure, DirectLight, DirectLightInputs,
-    DirectLightResources, EnvMapSelector, GBufferCapture, GBufferCaptureInputs, NearestOccluder, NearestOccluderInputs,
-    NearestOccluderResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings,
-    ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources, SoftShadow, SoftShadowInputs,
-    SoftShadowResources, Upsampler, UpsamplerInputs, UpsamplerResources, progressive_scale,
+    DirectLightResources, EnvMapSelector, GBufferCapture, GBufferCaptureInputs, MarkedSplatInputs, NearestOccluder,
+    NearestOccluderInputs, NearestOccluderResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources,
+    PhotonSplatterSettings, ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources, SoftShadow,
+    SoftShadowInputs, SoftShadowResources, SplatShape, Upsampler, UpsamplerInputs, UpsamplerResources, progressive_scale,
 };
 #[cfg(feature = "bvh")]
 use crate::resource::BvhGeometry;
 use crate::resource::{
     CameraView, CapturePurpose, CaptureView, DepthHierarchy, EnvMaps, GBuffer, Geometry, Irradiance, Lights,
-    NearestOccluders, Photons, PrepareContext, Radiance, ShadowMaps, Subsampling, Visibility,
+    MarkedPixels, NearestOccluders, Photons, PrepareContext, Radiance, ShadowMaps, Subsampling, Visibility,
 };
 use crate::scene::{Light, LightKind, SceneBounds, SceneSummary, UnitFrame};
 use crate::{Error, Timestamps};
@@ -108,10 +108,20 @@ pub struct ViewResources {
 /// Allocated while there is indirect light.
 #[derive(Debug)]
 struct IndirectView {
-    irradiance: Irradiance,
     splatter: PhotonSplatterResources,
-    /// Allocated while fewer pixels are estimated than seen.
-    coarse: Option<(Irradiance, UpsamplerResources)>,
+    estimated: Irradiance,
+    /// From coarse to fine, while fewer pixels are estimated than seen.
+    levels: Vec<UpsampledLevel>,
+}
+
+/// Irradiance made of that of the level before.
+#[derive(Debug)]
+struct UpsampledLevel {
+    subsampling: Subsampling,
+    irradiance: Irradiance,
+    upsampler: UpsamplerResources,
+    /// What is estimated anew.
+    marked: Option<MarkedPixels>,
 }
 
 /// What [`GiRenderer::record_scene`] needs.
@@ -645,7 +655,7 @@ impl GiRenderer {
                 photons: &scene.photons,
                 g_buffer: &resources.g_buffer,
                 subsampling: self.settings.subsampling,
-                irradiance: own.coarse.as_ref().map_or(&own.irradiance, |c| &c.0),
+                irradiance: &own.estimated,
                 area: state.area,
                 radius: state.frame.radius(),
                 sample_offset: self.sample_offset,
@@ -655,24 +665,13 @@ impl GiRenderer {
             self.passes
                 .photon_splatter
                 .record(encoder, &mut own.splatter, &splatter_inputs);
-            if let Some((coarse, upsampler)) = &mut own.coarse {
-                let upsampler_inputs = UpsamplerInputs {
-                    queue: inputs.queue,
-                    g_buffer: &resources.g_buffer,
-                    coarse,
-                    subsampling: self.settings.subsampling,
-                    irradiance: &own.irradiance,
-                    settings: &self.settings.upsampler,
-                    timestamps: inputs.timestamps,
-                };
-                self.passes.upsampler.record(encoder, upsampler, &upsampler_inputs);
-            }
+            self.upsample(encoder, &resources.g_buffer, own, inputs);
         }
         let composite_inputs = CompositeInputs {
             queue: inputs.queue,
             g_buffer: &resources.g_buffer,
             direct: resources.direct.as_ref().map_or(&self.black, |d| &d.0),
-            indirect: resources.indirect.as_ref().map_or(&self.black, |i| &i.irradiance),
+            indirect: resources.indirect.as_ref().map_or(&self.black, IndirectView::irradiance),
             radiance: &resources.radiance,
             settings: inputs.composite,
             timestamps: inputs.timestamps,
@@ -681,6 +680,47 @@ impl GiRenderer {
             .composite
             .record(encoder, &mut resources.composite, &composite_inputs);
         Ok(())
+    }
+
+    /// Records the levels between the pixels that were estimated and all of them.
+    fn upsample(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        g_buffer: &GBuffer,
+        own: &mut IndirectView,
+        inputs: &ViewInputs<'_>,
+    ) {
+        let (mut coarse, mut subsampling) = (&own.estimated, self.settings.subsampling);
+        for level in &mut own.levels {
+            let upsampler_inputs = UpsamplerInputs {
+                queue: inputs.queue,
+                g_buffer,
+                coarse,
+                subsampling,
+                target: level.subsampling,
+                irradiance: &level.irradiance,
+                marked: level.marked.as_ref(),
+                settings: &self.settings.upsampler,
+                timestamps: inputs.timestamps,
+            };
+            self.passes
+                .upsampler
+                .record(encoder, &mut level.upsampler, &upsampler_inputs);
+            if let Some(marked) = &level.marked {
+                let marked_inputs = MarkedSplatInputs {
+                    queue: inputs.queue,
+                    g_buffer,
+                    subsampling: level.subsampling,
+                    irradiance: &level.irradiance,
+                    marked,
+                    timestamps: inputs.timestamps,
+                };
+                self.passes
+                    .photon_splatter
+                    .record_marked(encoder, &mut own.splatter, &marked_inputs);
+            }
+            (coarse, subsampling) = (&level.irradiance, level.subsampling);
+        }
     }
 
     fn allocate_view(&self, view: &mut ViewResources) -> Result<(), Error> {
@@ -794,19 +834,57 @@ impl IndirectView {
     fn new(device: &wgpu::Device, settings: &Settings, photons: &Photons, size: [u32; 2]) -> Result<Self, Error> {
         let config = &settings.splatter_config;
         let estimated = settings.subsampling.size(size);
-        let splatted = Irradiance::new(device, estimated, wgpu::TextureFormat::Rgba32Float)?;
         let splatter = PhotonSplatterResources::new(device, config, photons, estimated)?;
-        let (irradiance, coarse) = if settings.subsampling == Subsampling::Full {
-            (splatted, None)
-        } else {
-            let full = Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?;
-            (full, Some((splatted, UpsamplerResources::new(device)?)))
-        };
+        let estimated = Irradiance::new(device, estimated, wgpu::TextureFormat::Rgba32Float)?;
+        let by_levels = settings.upsampling == Upsampling::ByLevels;
+        let mut levels = Vec::new();
+        let mut finer = settings.subsampling.finer();
+        while let Some(subsampling) = finer {
+            finer = subsampling.finer();
+            if by_levels || finer.is_none() {
+                let is_marked = by_levels && config.shape == SplatShape::Tiled;
+                levels.push(UpsampledLevel::new(device, subsampling, size, is_marked)?);
+            }
+        }
         Ok(Self {
-            irradiance,
             splatter,
-            coarse,
+            estimated,
+            levels,
         })
+    }
+
+    /// At all pixels.
+    fn irradiance(&self) -> &Irradiance {
+        self.levels.last().map_or(&self.estimated, |l| &l.irradiance)
+    }
+
+    fn memory_by_resource(&self) -> Vec<(&'static str, u64)> {
+        let mut list = vec![
+            ("indirect_irradiance", self.estimated.memory_use()),
+            ("splatter", self.splatter.memory_use()),
+        ];
+        if !self.levels.is_empty() {
+            let levels = self.levels.iter().map(UpsampledLevel::memory_use);
+            list.push(("upsampled_irradiance", levels.sum()));
+        }
+        list
+    }
+}
+
+impl UpsampledLevel {
+    fn new(device: &wgpu::Device, subsampling: Subsampling, full: [u32; 2], is_marked: bool) -> Result<Self, Error> {
+        let size = subsampling.size(full);
+        Ok(Self {
+            subsampling,
+            irradiance: Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?,
+            upsampler: UpsamplerResources::new(device)?,
+            marked: is_marked.then(|| MarkedPixels::new(device, size)).transpose()?,
+        })
+    }
+
+    fn memory_use(&self) -> u64 {
+        let marked = self.marked.as_ref().map_or(0, MarkedPixels::memory_use);
+        self.irradiance.memory_use() + self.upsampler.memory_use() + marked
     }
 }
 
@@ -831,9 +909,15 @@ impl ViewResources {
         self.soft.as_ref().map(|s| &s.0)
     }
 
+    /// What was estimated anew at each level of up-sampling, from coarse to fine; nothing where pixels are interpolated only.
+    pub fn marked_pixels(&self) -> impl Iterator<Item = &MarkedPixels> {
+        let levels = self.indirect.as_ref().map_or(&[][..], |i| &i.levels);
+        levels.iter().filter_map(|l| l.marked.as_ref())
+    }
+
     /// Indirect irradiance, if there is any.
     pub fn indirect(&self) -> Option<&Irradiance> {
-        self.indirect.as_ref().map(|i| &i.irradiance)
+        self.indirect.as_ref().map(IndirectView::irradiance)
     }
 
     /// Bytes of this view, by resource.
@@ -850,11 +934,7 @@ impl ViewResources {
             list.push(("soft_shadow", own.memory_use()));
         }
         if let Some(own) = &self.indirect {
-            list.push(("indirect_irradiance", own.irradiance.memory_use()));
-            list.push(("splatter", own.splatter.memory_use()));
-            if let Some((coarse, upsampler)) = &own.coarse {
-                list.push(("coarse_irradiance", coarse.memory_use() + upsampler.memory_use()));
-            }
+            list.extend(own.memory_by_resource());
         }
         list
     }

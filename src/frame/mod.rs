@@ -10,4 +10,4 @@ mod settings;
 
 pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};
 pub use plan::{Plan, PlannedStage, Stage};
-pub use settings::{Settings, TracerKind};
+pub use settings::{Settings, TracerKind, Upsampling};

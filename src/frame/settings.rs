@@ -39,6 +39,17 @@ impl TracerKind {
     }
 }
 
+/// How irradiance that was estimated at a part of the pixels comes to all of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Upsampling {
+    /// Interpolated at once.
+    AtOnce,
+    /// Level by level, each of twice the pixels along an axis, and estimated anew where the samples around a pixel leave in
+    /// doubt what it shows. That takes [`SplatShape::Tiled`]; with the other shapes pixels are interpolated only.
+    #[default]
+    ByLevels,
+}
+
 /// Settings of all stages. Start from a preset and change fields, or [`Settings::set`] them by name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
@@ -79,6 +90,8 @@ pub struct Settings {
     pub radius_alpha: f32,
     /// At which pixels irradiance is estimated; the others are interpolated.
     pub subsampling: Subsampling,
+    /// At once or level by level.
+    pub upsampling: Upsampling,
     /// Between which pixels they are.
     pub upsampler: UpsamplerSettings,
 }
@@ -137,6 +150,7 @@ impl Settings {
             splatter: PhotonSplatterSettings::default(),
             radius_alpha: 2.0 / 3.0,
             subsampling: Subsampling::Quarter,
+            upsampling: Upsampling::default(),
             upsampler: UpsamplerSettings::default(),
         }
     }
@@ -508,6 +522,13 @@ const KNOBS: &[Knob] = &[
         ["4", Subsampling::Quarter],
         ["8", Subsampling::Eighth]
     ),
+    choice!(
+        "upsampler.levels",
+        "at-once or by-levels",
+        upsampling,
+        ["at-once", Upsampling::AtOnce],
+        ["by-levels", Upsampling::ByLevels]
+    ),
     field!(
         "upsampler.normal_agreement",
         "below 1: a cosine",
@@ -519,6 +540,12 @@ const KNOBS: &[Knob] = &[
         "above 0",
         upsampler.plane_distance,
         |v: f32| v > 0.0 && v.is_finite()
+    ),
+    field!(
+        "upsampler.disagreement",
+        "0 or more: share of the mean",
+        upsampler.disagreement,
+        |v: f32| v >= 0.0
     ),
 ];
 

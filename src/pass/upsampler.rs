@@ -20,7 +20,7 @@
 //! outermost samples the outermost counts alone.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
-use crate::resource::{GBuffer, Irradiance, Subsampling};
+use crate::resource::{GBuffer, Irradiance, MarkedPixels, Subsampling};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -31,13 +31,16 @@ pub(crate) mod gpu {
     #[repr(C)]
     pub(crate) struct Params {
         pub(crate) factor: u32,
+        pub(crate) target_factor: u32,
         pub(crate) normal_agreement: f32,
         pub(crate) plane_distance: f32,
+        pub(crate) disagreement: f32,
+        pub(crate) is_marking: u32,
     }
 }
 
 /// Bindings of `shaders/pass/upsampler.wgsl`, in order.
-pub(crate) const SLOTS: [Slot; 7] = [
+pub(crate) const SLOTS: [Slot; 8] = [
     Slot::Uniform,
     Slot::Uniform,
     Slot::Texture,
@@ -45,6 +48,7 @@ pub(crate) const SLOTS: [Slot; 7] = [
     Slot::Texture,
     Slot::Texture,
     Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
+    Slot::StorageMut,
 ];
 
 /// Which samples a pixel takes. Neither field costs time.
@@ -58,6 +62,9 @@ pub struct UpsamplerSettings {
     /// seen on the screen; its weight falls linearly to there. Lower keeps thinner steps apart; higher finds samples on
     /// surfaces that are curved away from the eye.
     pub plane_distance: f32,
+    /// Difference of the samples around a pixel, as a share of their mean, above which the pixel is marked where marks are
+    /// wanted; 0 or more. Lower estimates more pixels anew.
+    pub disagreement: f32,
 }
 
 impl Default for UpsamplerSettings {
@@ -67,6 +74,7 @@ impl Default for UpsamplerSettings {
         Self {
             normal_agreement: 0.7,
             plane_distance: 0.5,
+            disagreement: 0.25,
         }
     }
 }
@@ -83,6 +91,8 @@ pub struct Upsampler {
 #[derive(Debug)]
 pub struct UpsamplerResources {
     params: wgpu::Buffer,
+    /// Bound where no marks are wanted.
+    no_marks: wgpu::Buffer,
     groups: BindGroupCache,
 }
 
@@ -98,8 +108,12 @@ pub struct UpsamplerInputs<'a> {
     pub coarse: &'a Irradiance,
     /// Where its samples stand.
     pub subsampling: Subsampling,
-    /// Written; `rgba32float` of the G-buffer's size.
+    /// Which pixels are interpolated: [`Subsampling::Full`] for all, or a finer one than that of the samples.
+    pub target: Subsampling,
+    /// Written; `rgba32float`, of the size that `target` makes of the G-buffer's.
     pub irradiance: &'a Irradiance,
+    /// Written, if it is of that size: pixels that are to be estimated anew.
+    pub marked: Option<&'a MarkedPixels>,
     /// Which samples to take.
     pub settings: &'a UpsamplerSettings,
     /// Sink for GPU time.
@@ -134,10 +148,15 @@ impl Upsampler {
         resources: &mut UpsamplerResources,
         inputs: &UpsamplerInputs<'_>,
     ) {
+        let size = inputs.target.size(inputs.g_buffer.size());
+        let marked = inputs.marked.filter(|m| m.size() == size);
         let params = gpu::Params {
             factor: inputs.subsampling.factor(),
+            target_factor: inputs.target.factor(),
             normal_agreement: inputs.settings.normal_agreement,
             plane_distance: inputs.settings.plane_distance,
+            disagreement: inputs.settings.disagreement,
+            is_marking: u32::from(marked.is_some()),
         };
         inputs
             .queue
@@ -151,10 +170,11 @@ impl Upsampler {
             (&views.base_color).into(),
             inputs.coarse.view().into(),
             inputs.irradiance.view().into(),
+            marked.map_or(&resources.no_marks, MarkedPixels::buffer).into(),
         ];
         let label = "lightfall::Upsampler";
         let group = resources.groups.get(&self.device, label, &self.layout, &bound);
-        let [width, height] = inputs.g_buffer.size();
+        let [width, height] = size;
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.upsample);
         pass.set_bind_group(0, &group, &[]);
@@ -170,12 +190,13 @@ impl UpsamplerResources {
     pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
         Ok(Self {
             params: device::uniform_buffer::<gpu::Params>(device, "lightfall::Upsampler::params")?,
+            no_marks: device::buffer(device, "lightfall::Upsampler::no_marks", 8, wgpu::BufferUsages::STORAGE)?,
             groups: BindGroupCache::default(),
         })
     }
 
     /// Bytes allocated.
     pub fn memory_use(&self) -> u64 {
-        self.params.size()
+        self.params.size() + self.no_marks.size()
     }
 }

@@ -28,6 +28,16 @@ impl Subsampling {
         self as u32
     }
 
+    /// The next finer one; `None` for all pixels.
+    pub fn finer(self) -> Option<Self> {
+        match self {
+            Self::Full => None,
+            Self::Half => Some(Self::Full),
+            Self::Quarter => Some(Self::Half),
+            Self::Eighth => Some(Self::Quarter),
+        }
+    }
+
     /// Samples of an image of this size, rounded up: every block has one.
     pub fn size(self, full: [u32; 2]) -> [u32; 2] {
         full.map(|length| length.div_ceil(self.factor()))

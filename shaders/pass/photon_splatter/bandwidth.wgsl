@@ -17,8 +17,8 @@ fn bin_density(b: Bandwidth, photon: Photon) -> f32 {
         }
     }
     let pixels = f32(BIN * b.factor) * vec2f(last - first + 1);
-    let w = dot(matrix_row(3u), vec4f(photon.position, 1.0));
-    let side = w / pixels_a_length();
+    let w = dot(g_buffer_row(view, 3u), vec4f(photon.position, 1.0));
+    let side = w / g_buffer_pixels_a_length(view);
     let to_eye = normalize(view.eye.xyz - view.eye.w * photon.position);
     let cosine = max(abs(dot(to_eye, octahedral_unpack(photon.normal))), 0.05);
     return f32(count) * cosine / (pixels.x * pixels.y * side * side);
@@ -26,8 +26,8 @@ fn bin_density(b: Bandwidth, photon: Photon) -> f32 {
 
 // Radius that is wide enough on the screen; 0 behind the eye.
 fn splat_limit(b: Bandwidth, photon: Photon) -> f32 {
-    let w = dot(matrix_row(3u), vec4f(photon.position, 1.0));
-    return max(0.0, b.max_radius * w / pixels_a_length());
+    let w = dot(g_buffer_row(view, 3u), vec4f(photon.position, 1.0));
+    return max(0.0, b.max_radius * w / g_buffer_pixels_a_length(view));
 }
 
 // No kernel of this photon is wider.

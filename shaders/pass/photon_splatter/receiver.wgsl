@@ -10,12 +10,9 @@ struct Receiver {
 // No normal packs to this.
 const RECEIVER_NOWHERE: u32 = 0x80008000u;
 
-fn receiver_nowhere() -> vec4u {
-    return vec4u(0u, 0u, 0u, RECEIVER_NOWHERE);
-}
-
-fn receiver_pack(position: vec3f, normal: vec3f) -> vec4u {
-    return vec4u(bitcast<vec3u>(position), octahedral_pack(normal));
+fn receiver_pack(receiver: Receiver) -> vec4u {
+    let normal = select(RECEIVER_NOWHERE, octahedral_pack(receiver.normal), receiver.is_seen);
+    return vec4u(bitcast<vec3u>(receiver.position), normal);
 }
 
 fn receiver_unpack(texel: vec4u) -> Receiver {

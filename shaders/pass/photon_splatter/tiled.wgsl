@@ -45,8 +45,8 @@ fn projected_range(row: vec4f, w_row: vec4f, c: vec3f, h: f32) -> vec2f {
 
 // The pixels of the irradiance that a ball may touch: from, to.
 fn ball_pixels(c: vec3f, h: f32) -> vec4f {
-    let x = projected_range(matrix_row(0u), matrix_row(3u), c, h);
-    let y = projected_range(matrix_row(1u), matrix_row(3u), c, h);
+    let x = projected_range(g_buffer_row(view, 0u), g_buffer_row(view, 3u), c, h);
+    let y = projected_range(g_buffer_row(view, 1u), g_buffer_row(view, 3u), c, h);
     let low = irradiance_point(params.bandwidth, vec2f(x.x, y.y));
     let high = irradiance_point(params.bandwidth, vec2f(x.y, y.x));
     let size = vec2f(subsampling_size(view.size, params.bandwidth.factor));

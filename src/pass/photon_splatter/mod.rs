@@ -14,7 +14,7 @@ pub(crate) mod sort;
 pub(crate) mod tiled;
 
 use crate::gpu::{self as device, BindGroupCache, Bound, ComputeSpec, Slot, TextureSpec};
-use crate::resource::{GBuffer, Irradiance, PHOTON_BYTES, Photons, Subsampling};
+use crate::resource::{GBuffer, Irradiance, MarkedPixels, PHOTON_BYTES, Photons, Subsampling};
 use crate::{Error, Timestamps, wgsl};
 use raster::{Raster, RasterBuffers};
 use tiled::{Tiled, TiledBuffers};
@@ -23,7 +23,7 @@ pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
     /// Twin of `Bandwidth` in `shaders/pass/photon_splatter/bandwidth.wgsl`.
-    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[derive(Debug, Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
     pub(crate) struct Bandwidth {
         pub(crate) scale: f32,
@@ -71,7 +71,7 @@ pub(crate) const FINISH_SLOTS: [Slot; 8] = [
     Slot::Texture,
     Slot::Texture,
     Slot::UintTexture,
-    Slot::TextureArray,
+    Slot::Texture,
     Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
 ];
 
@@ -260,10 +260,7 @@ pub struct PhotonSplatterResources {
     receiver_params: wgpu::Buffer,
     finish_params: wgpu::Buffer,
     receivers: wgpu::TextureView,
-    /// A layer for each part of the photons.
     sums: wgpu::TextureView,
-    /// The first of them.
-    first_sum: wgpu::TextureView,
     shape: ShapeBuffers,
     groups: [BindGroupCache; 2],
     bytes: u64,
@@ -296,6 +293,24 @@ pub struct PhotonSplatterInputs<'a> {
     pub sample_offset: u32,
     /// How to splat.
     pub settings: &'a PhotonSplatterSettings,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+/// What the estimate at marked pixels needs.
+#[derive(Debug, Clone, Copy)]
+pub struct MarkedSplatInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// The G-buffer of the last `record`.
+    pub g_buffer: &'a GBuffer,
+    /// Which of its pixels may be marked; any, whatever the last `record` had.
+    pub subsampling: Subsampling,
+    /// Written where a pixel is marked, alpha 1; `rgba32float`, of the size that [`Subsampling::size`] makes of the
+    /// G-buffer's.
+    pub irradiance: &'a Irradiance,
+    /// The marked ones of its pixels, of the same size; of another size, nothing is estimated.
+    pub marked: &'a MarkedPixels,
     /// Sink for GPU time.
     pub timestamps: Option<&'a Timestamps>,
 }
@@ -389,7 +404,7 @@ impl PhotonSplatter {
                 tiled.record(&self.device, encoder, buffers, inputs, &bandwidth, targets);
             }
             (Shape::Raster(raster), ShapeBuffers::Raster(buffers)) => {
-                let targets = (&resources.receivers, &resources.first_sum);
+                let targets = (&resources.receivers, &resources.sums);
                 raster.record(&self.device, encoder, buffers, inputs, &bandwidth, targets);
             }
             // Resources of another shape: nothing is estimated.
@@ -397,6 +412,23 @@ impl PhotonSplatter {
         }
         self.finish(encoder, resources, inputs);
         encoder.pop_debug_group();
+    }
+
+    /// Records the estimate at marked pixels, of the photons and with the settings of the last `record`, whose kernels are the
+    /// same at any sub-sampling: what an interpolation between its pixels leaves in doubt. Tiled shape only; the others
+    /// estimate nothing. At most one call for each sub-sampling in a submission.
+    pub fn record_marked(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut PhotonSplatterResources,
+        inputs: &MarkedSplatInputs<'_>,
+    ) {
+        let size = inputs.subsampling.size(inputs.g_buffer.size());
+        if let (Shape::Tiled(tiled), ShapeBuffers::Tiled(buffers)) = (&self.shape, &mut resources.shape)
+            && inputs.marked.size() == size
+        {
+            tiled.record_marked(&self.device, encoder, buffers, inputs);
+        }
     }
 
     fn find_receivers(
@@ -434,7 +466,7 @@ impl PhotonSplatter {
     ) {
         let params = gpu::FinishParams {
             factor: inputs.subsampling.factor(),
-            is_corrected: u32::from(inputs.settings.boundary == BoundaryCorrection::KernelArea),
+            is_corrected: is_corrected(inputs.settings),
             sample_offset: inputs.sample_offset,
         };
         inputs
@@ -476,7 +508,7 @@ impl PhotonSplatterResources {
     pub fn size_in_bytes(config: &PhotonSplatterConfig, slots: u32, size: [u32; 2]) -> u64 {
         let params = size_of::<gpu::ReceiverParams>() + size_of::<gpu::FinishParams>();
         let textures = device::texture_bytes(size, 1, RECEIVER_FORMAT)
-            + device::texture_bytes(size, sum_layers(config, slots), config.sum_format());
+            + device::texture_bytes(size, 1, config.sum_format());
         let shape = match config.shape {
             SplatShape::Tiled => TiledBuffers::size_in_bytes(slots, size),
             SplatShape::Quads | SplatShape::Volumes => RasterBuffers::size_in_bytes(size),
@@ -507,11 +539,11 @@ impl PhotonSplatterResources {
         size: [u32; 2],
     ) -> Result<Self, Error> {
         use wgpu::TextureUsages as U;
-        let texture = |label, layers, format, usage| {
+        let texture = |label, format, usage| {
             let spec = TextureSpec {
                 label,
                 size,
-                layers,
+                layers: 1,
                 format,
                 usage: usage | U::TEXTURE_BINDING,
             };
@@ -530,16 +562,10 @@ impl PhotonSplatterResources {
         };
         let receivers = texture(
             "lightfall::PhotonSplatter::receivers",
-            1,
             RECEIVER_FORMAT,
             U::STORAGE_BINDING,
         )?;
-        let sums = texture(
-            "lightfall::PhotonSplatter::sums",
-            sum_layers(config, slots),
-            config.sum_format(),
-            sum_usage,
-        )?;
+        let sums = texture("lightfall::PhotonSplatter::sums", config.sum_format(), sum_usage)?;
         Ok(Self {
             receiver_params: device::uniform_buffer::<gpu::ReceiverParams>(
                 device,
@@ -550,8 +576,7 @@ impl PhotonSplatterResources {
                 "lightfall::PhotonSplatter::finish_params",
             )?,
             receivers: receivers.create_view(&Default::default()),
-            sums: device::array_view(&sums),
-            first_sum: device::layer_view(&sums, 0),
+            sums: sums.create_view(&Default::default()),
             shape,
             groups: Default::default(),
             bytes: Self::size_in_bytes(config, slots, size),
@@ -564,12 +589,8 @@ impl PhotonSplatterResources {
     }
 }
 
-/// Layers of the sums.
-fn sum_layers(config: &PhotonSplatterConfig, slots: u32) -> u32 {
-    match config.shape {
-        SplatShape::Tiled => tiled::parts(slots),
-        SplatShape::Quads | SplatShape::Volumes => 1,
-    }
+fn is_corrected(settings: &PhotonSplatterSettings) -> u32 {
+    u32::from(settings.boundary == BoundaryCorrection::KernelArea)
 }
 
 /// All slots but hop 0.

@@ -1,9 +1,10 @@
 //! The tiled shape: photons sorted into bins of the screen, and gathered by blocks of pixels.
 
 use super::sort::{SortBuffers, StableSort};
-use super::{PhotonSplatterInputs, bin_total, gpu as shared, splatted_slots};
+use super::{MarkedSplatInputs, PhotonSplatterInputs, bin_total, gpu as shared, is_corrected, splatted_slots};
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::pass::dispatch_64;
+use crate::resource::Subsampling;
 use crate::{Error, wgsl};
 
 pub(crate) mod gpu {
@@ -18,6 +19,16 @@ pub(crate) mod gpu {
         pub(crate) first_slot: u32,
         pub(crate) slot_count: u32,
         pub(crate) row: u32,
+    }
+
+    /// Twin of `MarkedParams` in `gather_marked.wgsl`.
+    #[derive(Debug, Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct MarkedParams {
+        pub(crate) bandwidth: Bandwidth,
+        pub(crate) factor: u32,
+        pub(crate) is_corrected: u32,
+        pub(crate) sample_offset: u32,
     }
 
     /// Twin of `Splat`.
@@ -51,22 +62,29 @@ pub(crate) const GATHER_SLOTS: [Slot; 7] = [
     Slot::Storage,
     Slot::Storage,
     Slot::UintTexture,
-    Slot::StorageArray(wgpu::TextureFormat::Rgba32Float),
+    Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
 ];
 
-/// Pixels along the side of what a workgroup gathers. Twin of `TILE` in `gather_tiled.wgsl`.
+/// Bindings of `shaders/pass/photon_splatter/gather_marked.wgsl`, in order.
+pub(crate) const MARKED_SLOTS: [Slot; 10] = [
+    Slot::Uniform,
+    Slot::Uniform,
+    Slot::Storage,
+    Slot::Storage,
+    Slot::Storage,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::Texture,
+    Slot::Storage,
+    Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
+];
+
+/// Pixels along the side of what a workgroup gathers. Twin of `TILE` in `gather_tiled.wgsl` and `gather_marked.wgsl`.
 pub(crate) const TILE: u32 = 16;
 
-/// Photons that are added up in a turn of the gather's loop. Twin of `SPLATS_A_TURN`.
-pub(crate) const SPLATS_A_TURN: u32 = 16;
-
-/// Turns that an invocation may take: llvmpipe ends a shader's loops after 65 535 in all.
-const MOST_TURNS: u32 = 60_000;
-
-/// Parts that photons are gathered in, each into a layer of the sums.
-pub(super) fn parts(slots: u32) -> u32 {
-    slots.div_ceil(MOST_TURNS * SPLATS_A_TURN).max(1)
-}
+/// Most photons that are gathered, all hops but the first together: 64 in each of 60 000 turns. llvmpipe ends a shader's
+/// loops after 65 535 turns in all.
+const MOST_SPLATS: u32 = 64 * 60_000;
 
 /// Its pipelines.
 #[derive(Debug)]
@@ -78,6 +96,8 @@ pub(super) struct Tiled {
     prepare: wgpu::ComputePipeline,
     gather_layout: wgpu::BindGroupLayout,
     gather: wgpu::ComputePipeline,
+    marked_layout: wgpu::BindGroupLayout,
+    gather_marked: wgpu::ComputePipeline,
 }
 
 /// Its working memory.
@@ -92,6 +112,17 @@ pub(super) struct TiledBuffers {
     size: [u32; 2],
     groups: BindGroupCache,
     gather_groups: BindGroupCache,
+    /// By the logarithm of the sub-sampling.
+    marked: [MarkedBuffers; 4],
+    /// What photons were sorted for; `None` before they were.
+    sorted_for: Option<gpu::MarkedParams>,
+}
+
+/// Of one sub-sampling: several may be recorded before any of them runs.
+#[derive(Debug)]
+struct MarkedBuffers {
+    params: wgpu::Buffer,
+    groups: BindGroupCache,
 }
 
 impl Tiled {
@@ -99,6 +130,7 @@ impl Tiled {
         let label = "lightfall::PhotonSplatter";
         let layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &TILED_SLOTS);
         let gather_layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &GATHER_SLOTS);
+        let marked_layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &MARKED_SLOTS);
         let pipeline = |label, source, entry_point, layout, constants| {
             device::compute_pipeline(
                 device,
@@ -124,8 +156,16 @@ impl Tiled {
                 &gather_layout,
                 kernel,
             ),
+            gather_marked: pipeline(
+                "lightfall::PhotonSplatter::gather_marked",
+                wgsl::PHOTON_SPLATTER_MARKED,
+                "gather_marked",
+                &marked_layout,
+                kernel,
+            ),
             layout,
             gather_layout,
+            marked_layout,
         }
     }
 
@@ -140,6 +180,7 @@ impl Tiled {
     ) {
         let slots = splatted_slots(inputs.photons).min(buffers.slots);
         let size = inputs.subsampling.size(inputs.g_buffer.size());
+        buffers.sorted_for = None;
         if [0, 1].into_iter().any(|axis| size[axis] > buffers.size[axis]) {
             // Made for a smaller image.
             return;
@@ -154,6 +195,12 @@ impl Tiled {
         inputs
             .queue
             .write_buffer(&buffers.params, 0, bytemuck::bytes_of(&params));
+        buffers.sorted_for = Some(gpu::MarkedParams {
+            bandwidth: *bandwidth,
+            factor: bandwidth.factor,
+            is_corrected: is_corrected(inputs.settings),
+            sample_offset: inputs.sample_offset,
+        });
         encoder.clear_buffer(&buffers.reach, 0, None);
         let view = inputs.g_buffer.view_buffer();
         let label = "lightfall::PhotonSplatter";
@@ -200,7 +247,47 @@ impl Tiled {
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.gather);
         pass.set_bind_group(0, &gathering, &[]);
-        pass.dispatch_workgroups(size[0].div_ceil(TILE), size[1].div_ceil(TILE), parts(buffers.slots));
+        pass.dispatch_workgroups(size[0].div_ceil(TILE), size[1].div_ceil(TILE), 1);
+    }
+
+    pub(super) fn record_marked(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        buffers: &mut TiledBuffers,
+        inputs: &MarkedSplatInputs<'_>,
+    ) {
+        let Some(sorted_for) = buffers.sorted_for else {
+            return;
+        };
+        let params = gpu::MarkedParams {
+            factor: inputs.subsampling.factor(),
+            ..sorted_for
+        };
+        let own = &mut buffers.marked[level(inputs.subsampling)];
+        inputs
+            .queue
+            .write_buffer(&own.params, 0, bytemuck::bytes_of(&params));
+        let views = inputs.g_buffer.views();
+        let bound = [
+            (&own.params).into(),
+            inputs.g_buffer.view_buffer().into(),
+            (&buffers.splats).into(),
+            (&buffers.first_splats).into(),
+            (&buffers.reach).into(),
+            (&views.depth).into(),
+            (&views.normal).into(),
+            (&views.base_color).into(),
+            inputs.marked.buffer().into(),
+            inputs.irradiance.view().into(),
+        ];
+        let label = "lightfall::PhotonSplatter::gather_marked";
+        let group = own.groups.get(device, label, &self.marked_layout, &bound);
+        let size = inputs.subsampling.size(inputs.g_buffer.size());
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(&self.gather_marked);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(size[0].div_ceil(TILE), size[1].div_ceil(TILE), 1);
     }
 }
 
@@ -208,10 +295,19 @@ impl TiledBuffers {
     /// Bytes for so many slots and irradiance of this size.
     pub(super) fn size_in_bytes(slots: u32, size: [u32; 2]) -> u64 {
         let [splats, bins] = sizes(slots, size);
-        SortBuffers::size_in_bytes(slots, bin_total(size)) + splats + 2 * bins + size_of::<gpu::TiledParams>() as u64
+        let params = size_of::<gpu::TiledParams>() + 4 * size_of::<gpu::MarkedParams>();
+        SortBuffers::size_in_bytes(slots, bin_total(size)) + splats + 2 * bins + params as u64
     }
 
     pub(super) fn check(device: &wgpu::Device, slots: u32) -> Result<(), Error> {
+        if slots > MOST_SPLATS {
+            return Err(Error::LimitExceeded {
+                what: "photons for PhotonSplatter, without the first hop".into(),
+                needed: u64::from(slots),
+                limit: u64::from(MOST_SPLATS),
+                remedy: "emit fewer a frame and accumulate more frames, or let them bounce less often",
+            });
+        }
         let [splats, _] = sizes(slots, [1, 1]);
         let usage = wgpu::BufferUsages::STORAGE;
         device::check_buffer(device, "lightfall::PhotonSplatter::splats", splats, usage)
@@ -221,6 +317,13 @@ impl TiledBuffers {
         use wgpu::BufferUsages as U;
         let [splats, bins] = sizes(slots, size);
         let buffer = |label, bytes| device::buffer(device, label, bytes, U::STORAGE | U::COPY_DST);
+        let marked = || -> Result<_, Error> {
+            let label = "lightfall::PhotonSplatter::marked_params";
+            Ok(MarkedBuffers {
+                params: device::uniform_buffer::<gpu::MarkedParams>(device, label)?,
+                groups: BindGroupCache::default(),
+            })
+        };
         Ok(Self {
             params: device::uniform_buffer::<gpu::TiledParams>(device, "lightfall::PhotonSplatter::params")?,
             sort: SortBuffers::new(device, slots, bin_total(size))?,
@@ -231,8 +334,15 @@ impl TiledBuffers {
             size,
             groups: BindGroupCache::for_uses(2),
             gather_groups: BindGroupCache::default(),
+            marked: [marked()?, marked()?, marked()?, marked()?],
+            sorted_for: None,
         })
     }
+}
+
+/// Which of `TiledBuffers::marked` a sub-sampling has.
+fn level(subsampling: Subsampling) -> usize {
+    subsampling.factor().ilog2() as usize
 }
 
 /// Bytes of the splats, and of one number for each bin and one more.
