@@ -297,6 +297,9 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::UPSAMPLER, "Params", upsampler::gpu::Params {
             factor, target_factor, normal_agreement, plane_distance, disagreement, is_marking
         }),
+        twin!(wgsl::PHOTON_SPLATTER_MARKED, "MarkedPixels", marked_pixels::gpu::MarkedPixels {
+            workgroups, count, pixels
+        }),
         twin!(wgsl::PHOTON_SPLATTER_MARKED, "MarkedParams", tiled::gpu::MarkedParams {
             bandwidth, factor, is_corrected, sample_offset
         }),

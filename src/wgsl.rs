@@ -241,7 +241,6 @@ pub(crate) const PHOTON_SPLATTER_FINISH: &str = compose![
 
 pub(crate) const UPSAMPLER: &str = compose![
     "pass/upsampler.wgsl",
-    "common/marked_pixels.wgsl",
     "common/g_buffer.wgsl",
     "common/subsampling.wgsl",
     "common/octahedral.wgsl",
@@ -420,7 +419,6 @@ pub const MODULES: &[(&str, &str)] = &[
 pub const COMMON: &str = compose![
     "common/depth_range.wgsl",
     "common/lost_rays.wgsl",
-    "common/marked_pixels.wgsl",
     "common/photon.wgsl",
     "common/subsampling.wgsl",
     "common/octahedral.wgsl",

@@ -198,7 +198,7 @@ impl<'a> Offline<'a> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let share = |marked: &MarkedPixels| {
             let [width, height] = marked.size().map(f64::from);
-            Ok(marked.count_blocking(device, queue)? as f64 / (width * height))
+            Ok(marked.read_blocking(device, queue)?.len() as f64 / (width * height))
         };
         self.view.marked_pixels().map(share).collect()
     }

@@ -15,6 +15,13 @@ struct Params {
     is_marking: u32,
 }
 
+// `MarkedPixels` while it is filled.
+struct Marking {
+    workgroups: array<u32, 3>,
+    count: atomic<u32>,
+    pixels: array<u32>,
+}
+
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> view: View;
 @group(0) @binding(2) var depth_texture: texture_2d<f32>;
@@ -22,7 +29,7 @@ struct Params {
 @group(0) @binding(4) var base_color_texture: texture_2d<f32>;
 @group(0) @binding(5) var coarse: texture_2d<f32>;
 @group(0) @binding(6) var irradiance: texture_storage_2d<rgba32float, write>;
-@group(0) @binding(7) var<storage, read_write> marked: array<u32>;
+@group(0) @binding(7) var<storage, read_write> marked: Marking;
 
 // Positions come from f32 depths through an f32 matrix: some ten roundings of 2^-24 of the numbers involved, which are of
 // the order of the region's radius (at most 1) or of the distance to the eye.
@@ -192,27 +199,39 @@ fn estimate_at(id: vec2u) -> Estimate {
     return Estimate(best.irradiance, 0.0, true);
 }
 
+// Of a workgroup's pixels: a bit for each that is marked, and where they go in the list.
 var<workgroup> marks: array<atomic<u32>, 2>;
+var<workgroup> first_mark: u32;
 
 @compute @workgroup_size(8, 8)
-fn upsample_pixels(
-    @builtin(global_invocation_id) id: vec3u,
-    @builtin(workgroup_id) group: vec3u,
-    @builtin(local_invocation_index) lane: u32,
-) {
-    let size = subsampling_size(view.size, params.target_factor);
-    if all(id.xy < min(size, textureDimensions(irradiance))) {
+fn upsample_pixels(@builtin(global_invocation_id) id: vec3u, @builtin(local_invocation_index) lane: u32) {
+    var is_marked = false;
+    if all(id.xy < min(subsampling_size(view.size, params.target_factor), textureDimensions(irradiance))) {
         let estimate = estimate_at(id.xy);
         textureStore(irradiance, id.xy, vec4f(estimate.irradiance, estimate.fits));
-        if estimate.is_marked {
-            atomicOr(&marks[lane / 32u], 1u << (lane % 32u));
-        }
+        is_marked = estimate.is_marked && params.is_marking == 1u;
+    }
+    if is_marked {
+        atomicOr(&marks[lane / 32u], 1u << (lane % 32u));
     }
     workgroupBarrier();
-    if params.is_marking == 1u && lane == 0u {
-        let words = vec2u(atomicLoad(&marks[0]), atomicLoad(&marks[1]));
-        let word = marked_word(group.xy, marked_blocks(size));
-        marked[word] = words.x;
-        marked[word + 1u] = words.y;
+    let words = vec2u(atomicLoad(&marks[0]), atomicLoad(&marks[1]));
+    let counts = countOneBits(words);
+    if lane == 0u && counts.x + counts.y > 0u {
+        first_mark = atomicAdd(&marked.count, counts.x + counts.y);
     }
+    workgroupBarrier();
+    if is_marked {
+        let before = countOneBits(words[lane / 32u] & ((1u << (lane % 32u)) - 1u));
+        let rank = select(0u, counts.x, lane >= 32u) + before;
+        marked.pixels[first_mark + rank] = id.x | id.y << 16u;
+    }
+}
+
+// What an indirect dispatch needs.
+@compute @workgroup_size(1)
+fn count_marks() {
+    let groups = (atomicLoad(&marked.count) + 63u) / 64u;
+    let rows = (groups + 65534u) / 65535u;
+    marked.workgroups = array<u32, 3>(min(groups, 65535u), rows, 1u);
 }

@@ -14,7 +14,8 @@ use crate::pass::{
     DirectLightResources, EnvMapSelector, GBufferCapture, GBufferCaptureInputs, MarkedSplatInputs, NearestOccluder,
     NearestOccluderInputs, NearestOccluderResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources,
     PhotonSplatterSettings, ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources, SoftShadow,
-    SoftShadowInputs, SoftShadowResources, SplatShape, Upsampler, UpsamplerInputs, UpsamplerResources, progressive_scale,
+    SoftShadowInputs, SoftShadowResources, SplatShape, Upsampler, UpsamplerInputs, UpsamplerResources,
+    progressive_scale,
 };
 #[cfg(feature = "bvh")]
 use crate::resource::BvhGeometry;
@@ -671,7 +672,10 @@ impl GiRenderer {
             queue: inputs.queue,
             g_buffer: &resources.g_buffer,
             direct: resources.direct.as_ref().map_or(&self.black, |d| &d.0),
-            indirect: resources.indirect.as_ref().map_or(&self.black, IndirectView::irradiance),
+            indirect: resources
+                .indirect
+                .as_ref()
+                .map_or(&self.black, IndirectView::irradiance),
             radiance: &resources.radiance,
             settings: inputs.composite,
             timestamps: inputs.timestamps,

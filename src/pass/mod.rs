@@ -46,8 +46,8 @@ pub use nearest_occluder::{NearestOccluder, NearestOccluderInputs, NearestOcclud
 pub use photon_emitter::{PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources};
 pub(crate) use photon_splatter::LARGEST_RADIUS;
 pub use photon_splatter::{
-    Bandwidth, BoundaryCorrection, Kernel, MarkedSplatInputs, PhotonSplatter, PhotonSplatterConfig, PhotonSplatterInputs,
-    PhotonSplatterResources, PhotonSplatterSettings, SplatShape, progressive_scale,
+    Bandwidth, BoundaryCorrection, Kernel, MarkedSplatInputs, PhotonSplatter, PhotonSplatterConfig,
+    PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings, SplatShape, progressive_scale,
 };
 pub use photon_walk::SharedHop;
 pub use shadow_map_capture::{ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources};

@@ -85,6 +85,7 @@ pub struct Upsampler {
     device: wgpu::Device,
     layout: wgpu::BindGroupLayout,
     upsample: wgpu::ComputePipeline,
+    count_marks: wgpu::ComputePipeline,
 }
 
 /// Uniforms and bind groups for one view.
@@ -124,20 +125,21 @@ impl Upsampler {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
         let layout = device::layout(device, "lightfall::Upsampler", wgpu::ShaderStages::COMPUTE, &SLOTS);
-        let upsample = device::compute_pipeline(
-            device,
-            &ComputeSpec {
-                label: "lightfall::Upsampler::upsample",
+        let pipeline = |label, entry_point| {
+            let spec = ComputeSpec {
+                label,
                 source: wgsl::UPSAMPLER,
-                entry_point: "upsample_pixels",
+                entry_point,
                 layouts: &[&layout],
                 constants: &[],
-            },
-        );
+            };
+            device::compute_pipeline(device, &spec)
+        };
         Self {
             device: device.clone(),
+            upsample: pipeline("lightfall::Upsampler::upsample", "upsample_pixels"),
+            count_marks: pipeline("lightfall::Upsampler::count_marks", "count_marks"),
             layout,
-            upsample,
         }
     }
 
@@ -161,6 +163,9 @@ impl Upsampler {
         inputs
             .queue
             .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        if let Some(marked) = marked {
+            marked.clear(encoder);
+        }
         let views = inputs.g_buffer.views();
         let bound = [
             (&resources.params).into(),
@@ -179,6 +184,10 @@ impl Upsampler {
         pass.set_pipeline(&self.upsample);
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(width.div_ceil(8), height.div_ceil(8), 1);
+        if marked.is_some() {
+            pass.set_pipeline(&self.count_marks);
+            pass.dispatch_workgroups(1, 1, 1);
+        }
     }
 }
 
@@ -190,7 +199,12 @@ impl UpsamplerResources {
     pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
         Ok(Self {
             params: device::uniform_buffer::<gpu::Params>(device, "lightfall::Upsampler::params")?,
-            no_marks: device::buffer(device, "lightfall::Upsampler::no_marks", 8, wgpu::BufferUsages::STORAGE)?,
+            no_marks: device::buffer(
+                device,
+                "lightfall::Upsampler::no_marks",
+                MarkedPixels::size_in_bytes([1, 1]),
+                wgpu::BufferUsages::STORAGE,
+            )?,
             groups: BindGroupCache::default(),
         })
     }

@@ -17,7 +17,7 @@ mod geometry;
 mod irradiance;
 pub(crate) mod lights;
 pub(crate) mod lost_rays;
-mod marked_pixels;
+pub(crate) mod marked_pixels;
 pub(crate) mod mesh_geometry;
 pub(crate) mod nearest_occluders;
 mod photons;

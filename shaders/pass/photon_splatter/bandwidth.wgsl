@@ -1,5 +1,8 @@
 // How wide a photon's kernel is. The shape brings `bin_count(bin) -> u32`.
 
+// Bins to each side of a photon's that its density is taken from.
+const BINS_AROUND: i32 = 2;
+
 // Photons per area in the bins around a photon, by the area that the bins cover on its plane.
 fn bin_density(b: Bandwidth, photon: Photon) -> f32 {
     let grid = bin_grid(b);
@@ -8,8 +11,8 @@ fn bin_density(b: Bandwidth, photon: Photon) -> f32 {
         return 0.0;
     }
     let at = vec2i(vec2u(bin % grid.x, bin / grid.x));
-    let first = max(at - 1, vec2i(0));
-    let last = min(at + 1, vec2i(grid) - 1);
+    let first = max(at - BINS_AROUND, vec2i(0));
+    let last = min(at + BINS_AROUND, vec2i(grid) - 1);
     var count = 0u;
     for (var y = first.y; y <= last.y; y++) {
         for (var x = first.x; x <= last.x; x++) {

@@ -17,6 +17,8 @@ struct FinishParams {
 @group(0) @binding(6) var sums: texture_2d<f32>;
 @group(0) @binding(7) var irradiance: texture_storage_2d<rgba32float, write>;
 
+alias Receivers = f32;
+
 @compute @workgroup_size(8, 8)
 fn finish_pixels(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= subsampling_size(view.size, params.factor)) {

@@ -10,13 +10,37 @@
 
 // Pixels along the side of what a workgroup gathers: 2 x 2 blocks of 8 x 8, of which each invocation has 2 x 2.
 const TILE: u32 = 16u;
-const BLOCK: u32 = 8u;
+
+alias Receivers = vec4f;
+
+// Nothing gathered yet. Indices are constants here and in `gather_sums`: what is indexed otherwise lives in memory.
+fn gather_start(r: array<Receiver, 4>) -> Gathered {
+    var g = Gathered();
+    g.x = vec4f(r[0].position.x, r[1].position.x, r[2].position.x, r[3].position.x);
+    g.y = vec4f(r[0].position.y, r[1].position.y, r[2].position.y, r[3].position.y);
+    g.z = vec4f(r[0].position.z, r[1].position.z, r[2].position.z, r[3].position.z);
+    // No normal agrees with one of no length.
+    let seen = vec4f(f32(r[0].is_seen), f32(r[1].is_seen), f32(r[2].is_seen), f32(r[3].is_seen));
+    g.normal_x = seen * vec4f(r[0].normal.x, r[1].normal.x, r[2].normal.x, r[3].normal.x);
+    g.normal_y = seen * vec4f(r[0].normal.y, r[1].normal.y, r[2].normal.y, r[3].normal.y);
+    g.normal_z = seen * vec4f(r[0].normal.z, r[1].normal.z, r[2].normal.z, r[3].normal.z);
+    return g;
+}
+
+// What each has gathered: irradiance, and its channels by the radii.
+fn gather_sums(g: Gathered) -> array<vec4f, 4> {
+    return array<vec4f, 4>(
+        vec4f(g.red.x, g.green.x, g.blue.x, g.radius.x),
+        vec4f(g.red.y, g.green.y, g.blue.y, g.radius.y),
+        vec4f(g.red.z, g.green.z, g.blue.z, g.radius.z),
+        vec4f(g.red.w, g.green.w, g.blue.w, g.radius.w),
+    );
+}
 
 @compute @workgroup_size(64)
 fn gather_tiles(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let block = lane / 16u;
-    let corner = TILE * group.xy + BLOCK * vec2u(block % 2u, block / 2u);
-    let own = corner + 2u * vec2u(lane % 4u, (lane / 4u) % 4u);
+    let own = TILE * group.xy + 8u * vec2u(block % 2u, block / 2u) + 2u * vec2u(lane % 4u, (lane / 4u) % 4u);
     let size = subsampling_size(view.size, params.bandwidth.factor);
     var seen: array<Receiver, 4>;
     for (var i = 0u; i < 4u; i++) {
@@ -24,7 +48,7 @@ fn gather_tiles(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
         seen[i] = receiver_unpack(textureLoad(receivers, pixel, 0));
     }
     var g = gather_start(seen);
-    gather_photons(&g, vec2i(corner), vec2i(corner + BLOCK));
+    gather_photons(&g, vec2f(own) + 0.5, vec2f(own) + 1.5);
     var found = gather_sums(g);
     for (var i = 0u; i < 4u; i++) {
         let pixel = own + vec2u(i % 2u, i / 2u);

@@ -32,6 +32,8 @@ fn raster_nothing() -> Corner {
     return Corner(vec4f(0.0, 0.0, 0.0, 1.0), vec3f(0.0), 1.0, vec3f(0.0), vec3f(0.0, 0.0, 1.0));
 }
 
+alias Receivers = f32;
+
 @fragment
 fn fragment(corner: Corner) -> @location(0) vec4f {
     let receiver = receiver_unpack(textureLoad(receivers, vec2u(corner.clip.xy), 0));
@@ -40,9 +42,9 @@ fn fragment(corner: Corner) -> @location(0) vec4f {
     }
     let d = receiver.position - corner.position;
     let inverse = 1.0 / (corner.radius * corner.radius);
-    let off_plane = vec4f(abs(dot(d, corner.normal)));
-    let agreement = vec4f(dot(receiver.normal, corner.normal));
-    let weight = splat_weight(vec4f(dot(d, d) * inverse), off_plane, agreement, splat_slab(corner.radius)).x;
+    let off_plane = abs(dot(d, corner.normal));
+    let agreement = dot(receiver.normal, corner.normal);
+    let weight = splat_weight(dot(d, d) * inverse, off_plane, agreement, splat_slab(corner.radius));
     let strength = corner.flux * inverse * weight;
     return vec4f(strength, (strength.x + strength.y + strength.z) * corner.radius);
 }

@@ -1,4 +1,4 @@
-// A stable radix sort of keys with values, one digit of six bits a pass (Satish, Harris and Garland 2009): each block
+// A stable radix sort of keys with values, one digit of seven bits a pass (Satish, Harris and Garland 2009): each block
 // of keys counts its digits, the counts are summed over digits and blocks, and each key goes where the sums say, behind
 // those before it of the same digit. Equal keys stay in order, so that the same input gives the same order, always.
 
@@ -21,7 +21,7 @@ struct SortParams {
 // By digit: how many there are of lower digits
 @group(0) @binding(6) var<storage, read_write> totals: array<u32>;
 
-const DIGITS: u32 = 64u;
+const DIGITS: u32 = 128u;
 const LANES: u32 = 256u;
 // Keys of a block over lanes
 const ROUNDS: u32 = 4u;
@@ -56,7 +56,7 @@ fn count_digits(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
 var<workgroup> sums: array<u32, DIGITS>;
 
 // One workgroup, one invocation a digit: over blocks, then over digits.
-@compute @workgroup_size(64)
+@compute @workgroup_size(128)
 fn sum_digits(@builtin(local_invocation_index) digit: u32) {
     var own = 0u;
     for (var block = 0u; block < sort.blocks; block++) {

@@ -1,4 +1,5 @@
-// What a photon gives to a surface point: shared by all shapes.
+// What a photon gives to surface points: shared by all shapes. The module says how many at a time: its `Receivers` is f32 or a
+// vector of it.
 //   E(x) = sum over photons of flux * K(|x - x_p| / h) / h^2,  K integrates to 1 over the unit disc.
 
 // 0: constant, 1: cone, 2: Epanechnikov
@@ -13,10 +14,10 @@ const SPLAT_SLAB: f32 = 0.25;
 // And at least this thick, unit frame: depth and photon positions are f32.
 const SPLAT_SLAB_FLOOR: f32 = 0x1p-11;
 
-// K at squared relative distances q in [0, 1], four receivers at a time.
-fn splat_kernel(q: vec4f) -> vec4f {
+// K at squared relative distances q in [0, 1].
+fn splat_kernel(q: Receivers) -> Receivers {
     switch kernel {
-        case 0u: { return vec4f(SPLAT_INVERSE_PI); }
+        case 0u: { return Receivers(SPLAT_INVERSE_PI); }
         case 1u: { return 3.0 * SPLAT_INVERSE_PI * (1.0 - sqrt(q)); }
         default: { return 2.0 * SPLAT_INVERSE_PI * (1.0 - q); }
     }
@@ -38,7 +39,8 @@ fn splat_slab(radius: f32) -> f32 {
 
 // K at receivers at squared relative distance q, this far off the photon's plane, whose normals agree with its by this
 // cosine; zero outside the disc, off the slab, or on a surface that turns away.
-fn splat_weight(q: vec4f, off_plane: vec4f, agreement: vec4f, slab: f32) -> vec4f {
-    let admitted = (q < vec4f(1.0)) & (off_plane <= vec4f(slab)) & (agreement >= vec4f(SPLAT_NORMAL_AGREEMENT));
-    return select(vec4f(0.0), splat_kernel(min(q, vec4f(1.0))), admitted);
+fn splat_weight(q: Receivers, off_plane: Receivers, agreement: Receivers, slab: f32) -> Receivers {
+    let near = (q < Receivers(1.0)) & (off_plane <= Receivers(slab));
+    let admitted = near & (agreement >= Receivers(SPLAT_NORMAL_AGREEMENT));
+    return select(Receivers(0.0), splat_kernel(min(q, Receivers(1.0))), admitted);
 }

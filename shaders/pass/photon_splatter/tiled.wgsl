@@ -11,7 +11,7 @@
 @group(0) @binding(5) var<storage, read_write> splats: array<Splat>;
 // Of each bin the first of its splats, and where those of the last end
 @group(0) @binding(6) var<storage, read_write> first_splats: array<u32>;
-// Of each bin the widest radius in pixels of the irradiance, rounded up
+// Of each bin, and behind them of all: how far beyond the bin a photon of it reaches, in parts of a pixel
 @group(0) @binding(7) var<storage, read_write> reach: array<atomic<u32>>;
 
 // Pixels beyond its bin that a photon reaches at most: twice what a ball in the middle of the view may.
@@ -127,7 +127,8 @@ fn prepare_splats(@builtin(global_invocation_id) id: vec3u) {
     }
     let inverse = 1.0 / (h * h);
     splats[index] = Splat(photon.position, inverse, photon.flux * inverse, photon.normal);
-    // A pixel of slack for rounding.
-    atomicMax(&reach[keys[index]], u32(ceil(beyond)) + 1u);
-    atomicMax(&reach[bins], u32(ceil(beyond)) + 1u);
+    // A step of slack for rounding.
+    let steps = u32(ceil(f32(REACH_STEPS) * beyond)) + 1u;
+    atomicMax(&reach[keys[index]], steps);
+    atomicMax(&reach[bins], steps);
 }

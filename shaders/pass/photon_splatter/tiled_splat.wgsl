@@ -9,6 +9,9 @@ struct TiledParams {
     row: u32,
 }
 
+// Parts of a pixel that reach is counted in.
+const REACH_STEPS: u32 = 16u;
+
 // A photon ready to be added up.
 struct Splat {
     position: vec3f,

@@ -78,10 +78,10 @@ pub(crate) const FINISH_SLOTS: [Slot; 8] = [
 const RECEIVER_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
 /// Pixels of the irradiance along the side of a bin. Twin of `BIN` in `bandwidth.wgsl`.
-pub(crate) const BIN: u32 = 4;
+pub(crate) const BIN: u32 = 1;
 
 /// Bins beyond each rim of the image. Twin of `BORDER`.
-pub(crate) const BORDER: u32 = 6;
+pub(crate) const BORDER: u32 = 12;
 
 /// Largest kernel radius, pixels, that the border holds, with a pixel of slack.
 pub(crate) const LARGEST_RADIUS: f32 = 23.0;
@@ -129,8 +129,8 @@ pub enum Bandwidth {
         /// Range that p̂ is clamped to.
         clamp: [f32; 2],
     },
-    /// The same with p̂ from how many photons of all hops lie around the photon on the screen, in 3 × 3 bins of 4 × 4 pixels
-    /// of the irradiance, by the area of its plane that they cover.
+    /// The same with p̂ from how many photons of all hops lie around the photon on the screen, in some 10 × 10 pixels of the
+    /// irradiance, by the area of its plane that they cover.
     Screen {
         /// k, photons under a kernel.
         photons: f32,
@@ -507,8 +507,8 @@ impl PhotonSplatterResources {
     /// Bytes of working memory for photon buffers of `slots` slots, hop 0 not counted, and irradiance of `size`.
     pub fn size_in_bytes(config: &PhotonSplatterConfig, slots: u32, size: [u32; 2]) -> u64 {
         let params = size_of::<gpu::ReceiverParams>() + size_of::<gpu::FinishParams>();
-        let textures = device::texture_bytes(size, 1, RECEIVER_FORMAT)
-            + device::texture_bytes(size, 1, config.sum_format());
+        let textures =
+            device::texture_bytes(size, 1, RECEIVER_FORMAT) + device::texture_bytes(size, 1, config.sum_format());
         let shape = match config.shape {
             SplatShape::Tiled => TiledBuffers::size_in_bytes(slots, size),
             SplatShape::Quads | SplatShape::Volumes => RasterBuffers::size_in_bytes(size),

@@ -33,7 +33,7 @@ pub(crate) const SORT_SLOTS: [Slot; 7] = [
 const BLOCK: u32 = 1024;
 
 /// Bits of the key that one pass sorts by, and their values.
-const DIGIT_BITS: u32 = 6;
+const DIGIT_BITS: u32 = 7;
 const DIGITS: u32 = 1 << DIGIT_BITS;
 
 /// Its pipelines.

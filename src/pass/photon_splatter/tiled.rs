@@ -79,7 +79,7 @@ pub(crate) const MARKED_SLOTS: [Slot; 10] = [
     Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
 ];
 
-/// Pixels along the side of what a workgroup gathers. Twin of `TILE` in `gather_tiled.wgsl` and `gather_marked.wgsl`.
+/// Pixels along the side of what a workgroup gathers. Twin of `TILE` in `gather_tiled.wgsl`.
 pub(crate) const TILE: u32 = 16;
 
 /// Most photons that are gathered, all hops but the first together: 64 in each of 60 000 turns. llvmpipe ends a shader's
@@ -265,9 +265,7 @@ impl Tiled {
             ..sorted_for
         };
         let own = &mut buffers.marked[level(inputs.subsampling)];
-        inputs
-            .queue
-            .write_buffer(&own.params, 0, bytemuck::bytes_of(&params));
+        inputs.queue.write_buffer(&own.params, 0, bytemuck::bytes_of(&params));
         let views = inputs.g_buffer.views();
         let bound = [
             (&own.params).into(),
@@ -283,11 +281,10 @@ impl Tiled {
         ];
         let label = "lightfall::PhotonSplatter::gather_marked";
         let group = own.groups.get(device, label, &self.marked_layout, &bound);
-        let size = inputs.subsampling.size(inputs.g_buffer.size());
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.gather_marked);
         pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups(size[0].div_ceil(TILE), size[1].div_ceil(TILE), 1);
+        pass.dispatch_workgroups_indirect(inputs.marked.buffer(), 0);
     }
 }
 
