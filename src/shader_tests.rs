@@ -10,7 +10,8 @@ use crate::pass::{
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
 use crate::resource::{
-    Photon, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, g_buffer, lights, lost_rays, mesh_geometry, view,
+    Photon, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, g_buffer, lights, lost_rays, marked_pixels,
+    mesh_geometry, view,
 };
 use crate::wgsl;
 #[cfg(feature = "bvh")]
@@ -294,6 +295,7 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::PHOTON_SPLATTER_FINISH, "FinishParams", photon_splatter::gpu::FinishParams {
             factor, is_corrected, sample_offset,
         }),
+        twin!(wgsl::UPSAMPLER, "Marking", marked_pixels::gpu::MarkedPixels { workgroups, count, pixels }),
         twin!(wgsl::UPSAMPLER, "Params", upsampler::gpu::Params {
             factor, target_factor, normal_agreement, plane_distance, disagreement, is_marking
         }),

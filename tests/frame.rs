@@ -230,7 +230,7 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
     let photons = Photons::new(device, settings.photons, settings.bounces).unwrap();
     let mut g_buffer = GBuffer::new(device, size).unwrap();
     let irradiance = || Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float).unwrap();
-    let (direct, indirect) = (irradiance(), irradiance());
+    let direct = irradiance();
     let estimated = settings.subsampling.size(size);
     let coarse = Irradiance::new(device, estimated, wgpu::TextureFormat::Rgba32Float).unwrap();
     let radiance = Radiance::new(device, size).unwrap();
@@ -329,20 +329,44 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
     let mut splatter = PhotonSplatterResources::new(device, &config, &photons, estimated).unwrap();
     let pass = PhotonSplatter::new(device, &config).unwrap();
     pass.record(&mut encoder, &mut splatter, &splatter_inputs);
-    let upsampler_inputs = UpsamplerInputs {
-        queue,
-        g_buffer: &g_buffer,
-        coarse: &coarse,
-        subsampling: settings.subsampling,
-        target: Subsampling::Full,
-        irradiance: &indirect,
-        marked: None,
-        settings: &settings.upsampler,
-        timestamps,
-    };
     // The renderer leaves it out where every pixel is estimated: it would change no bit.
-    let mut upsampler = UpsamplerResources::new(device).unwrap();
-    Upsampler::new(device).record(&mut encoder, &mut upsampler, &upsampler_inputs);
+    let targets: &[Subsampling] = match settings.subsampling {
+        Subsampling::Quarter => &[Subsampling::Half, Subsampling::Full],
+        _ => &[Subsampling::Full],
+    };
+    let upsample = Upsampler::new(device);
+    let (mut from, mut samples) = (coarse, settings.subsampling);
+    for &target in targets {
+        let size = target.size(size);
+        let finer = Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float).unwrap();
+        let marked = MarkedPixels::new(device, size).unwrap();
+        let upsampler_inputs = UpsamplerInputs {
+            queue,
+            g_buffer: &g_buffer,
+            coarse: &from,
+            subsampling: samples,
+            target,
+            irradiance: &finer,
+            marked: Some(&marked),
+            settings: &settings.upsampler,
+            timestamps,
+        };
+        let mut upsampler = UpsamplerResources::new(device).unwrap();
+        upsample.record(&mut encoder, &mut upsampler, &upsampler_inputs);
+        if settings.subsampling != Subsampling::Full {
+            let marked_inputs = MarkedSplatInputs {
+                queue,
+                g_buffer: &g_buffer,
+                subsampling: target,
+                irradiance: &finer,
+                marked: &marked,
+                timestamps,
+            };
+            pass.record_marked(&mut encoder, &mut splatter, &marked_inputs);
+        }
+        (from, samples) = (finer, target);
+    }
+    let indirect = from;
     let composite_inputs = CompositeInputs {
         queue,
         g_buffer: &g_buffer,

@@ -8,11 +8,12 @@ use common::{Component, Gpu, Offline, assert_no_errors, evaluate, gpu};
 use lightfall::frame::Settings;
 use lightfall::glam::{DAffine3, DMat4, DQuat, DVec2, DVec3};
 use lightfall::pass::{
-    Bandwidth, PhotonSplatter, PhotonSplatterConfig, PhotonSplatterInputs, PhotonSplatterResources,
+    Bandwidth, MarkedSplatInputs, PhotonSplatter, PhotonSplatterConfig, PhotonSplatterInputs, PhotonSplatterResources,
     PhotonSplatterSettings, SplatShape, Upsampler, UpsamplerInputs, UpsamplerResources, UpsamplerSettings,
 };
 use lightfall::resource::{
-    CameraView, GBuffer, GBufferViews, Irradiance, NormalEncoding, PHOTON_BYTES, Photon, Photons, Subsampling,
+    CameraView, GBuffer, GBufferViews, Irradiance, MarkedPixels, NormalEncoding, PHOTON_BYTES, Photon, Photons,
+    Subsampling,
 };
 use lightfall::scene::{Camera, Instance, Light, Material, Mesh, Projection, Scene, SceneBounds, UnitFrame};
 use lightfall::{read_rgba32float_blocking, wgpu};
@@ -378,12 +379,29 @@ fn a_power_of_two_in_irradiance_changes_no_other_bit() {
     assert_no_errors(&gpu);
 }
 
-/// Twin of `shaders/pass/upsampler.wgsl`: irradiance, alpha, and the weight that fitting samples had in all.
-fn twin(picture: &Picture, subsampling: Subsampling, coarse: &[[f32; 4]], pixel: [u32; 2]) -> (DVec3, f64, f64) {
+/// What the shader makes of a pixel.
+struct Twin {
+    irradiance: DVec3,
+    alpha: f64,
+    /// That fitting samples had in all.
+    weight: f64,
+    /// How far those of the four around the pixel differ, over the middle of them; above all disagreement where they do not
+    /// suffice.
+    doubt: f64,
+}
+
+/// Twin of `shaders/pass/upsampler.wgsl`.
+fn twin(picture: &Picture, subsampling: Subsampling, coarse: &[[f32; 4]], pixel: [u32; 2]) -> Twin {
+    let found = |irradiance, alpha, weight, doubt| Twin {
+        irradiance,
+        alpha,
+        weight,
+        doubt,
+    };
     let settings = UpsamplerSettings::default();
     let size = picture.size;
     let Some((position, shading)) = picture.at(pixel) else {
-        return (DVec3::ZERO, 0.0, 1.0);
+        return found(DVec3::ZERO, 0.0, 1.0, 0.0);
     };
     let matrix = matrix(&picture.view);
     let row = |i: usize| matrix.row(i);
@@ -422,7 +440,17 @@ fn twin(picture: &Picture, subsampling: Subsampling, coarse: &[[f32; 4]], pixel:
         .collect();
     let (value, total) = mean(&four);
     if total > 0.0 {
-        return (value, 1.0, total);
+        let lights = four
+            .iter()
+            .filter(|(_, weight)| *weight > 0.0)
+            .map(|(e, _)| e.element_sum());
+        let (least, most) = (lights.clone().fold(f64::INFINITY, f64::min), lights.fold(0.0, f64::max));
+        let doubt = if total < 0.25 {
+            f64::INFINITY
+        } else {
+            2.0 * (most - least) / (most + least)
+        };
+        return found(value, 1.0, total, doubt);
     }
     let counts = subsampling.size(size);
     let near = |low: u32, count: u32| low.saturating_sub(1)..(low + 3).min(count);
@@ -438,10 +466,10 @@ fn twin(picture: &Picture, subsampling: Subsampling, coarse: &[[f32; 4]], pixel:
         .collect();
     let (value, total) = mean(&weighted);
     if total > 0.0 {
-        return (value, 1.0, total);
+        return found(value, 1.0, total, f64::INFINITY);
     }
     let best = sixteen.iter().map(|(_, s)| s).min_by(|a, b| a.2.total_cmp(&b.2));
-    (best.map_or(DVec3::ZERO, |s| s.0), 0.0, 1.0)
+    found(best.map_or(DVec3::ZERO, |s| s.0), 0.0, 1.0, f64::INFINITY)
 }
 
 /// Twin of `g_buffer_geometric_normal`.
@@ -487,16 +515,16 @@ fn the_shader_weighs_as_its_twin_does() {
         let pixels = upsample(&gpu, &picture.g_buffer, subsampling, &coarse);
         let (mut worst, mut on_the_verge) = (0f64, 0);
         for (pixel, found) in picture.coordinates().zip(&pixels) {
-            let (value, alpha, total) = twin(&picture, subsampling, &coarse, pixel);
+            let wanted = twin(&picture, subsampling, &coarse, pixel);
             // A sample that barely fits may not fit after rounding, and weights are as uncertain as what they are the
             // small difference of: positions to 1e-6 of a pixel's 0.02, times 2 for `plane_distance`.
-            if total < 0.01 {
+            if wanted.weight < 0.01 {
                 on_the_verge += 1;
                 continue;
             }
-            assert_eq!(f64::from(found[3]), alpha, "{subsampling:?}: alpha of {pixel:?}");
-            let error = (DVec3::new(found[0].into(), found[1].into(), found[2].into()) - value).abs();
-            worst = worst.max(error.max_element() * total);
+            assert_eq!(f64::from(found[3]), wanted.alpha, "{subsampling:?}: alpha of {pixel:?}");
+            let error = (DVec3::new(found[0].into(), found[1].into(), found[2].into()) - wanted.irradiance).abs();
+            worst = worst.max(error.max_element() * wanted.weight);
         }
         println!("{subsampling:?}: worst {worst:.1e}, {on_the_verge} pixels on the verge");
         assert!(worst < 2e-4, "{subsampling:?}: {worst}");
@@ -829,6 +857,20 @@ fn splat(
     subsampling: Subsampling,
     photons: &Photons,
 ) -> Vec<[f32; 4]> {
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    let (_, _, target) = record_splat(gpu, picture, shape, subsampling, photons, &mut encoder);
+    gpu.queue.submit([encoder.finish()]);
+    read_rgba32float_blocking(&gpu.device, &gpu.queue, target.view().texture()).unwrap()
+}
+
+fn record_splat(
+    gpu: &Gpu,
+    picture: &Picture,
+    shape: SplatShape,
+    subsampling: Subsampling,
+    photons: &Photons,
+    encoder: &mut wgpu::CommandEncoder,
+) -> (PhotonSplatter, PhotonSplatterResources, Irradiance) {
     let config = PhotonSplatterConfig {
         shape,
         ..Default::default()
@@ -853,74 +895,207 @@ fn splat(
         settings: &settings,
         timestamps: None,
     };
-    let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    pass.record(&mut encoder, &mut resources, &inputs);
-    let wide = Irradiance::new(&gpu.device, size, wgpu::TextureFormat::Rgba32Float).unwrap();
-    let blitter = wgpu::util::TextureBlitter::new(&gpu.device, wgpu::TextureFormat::Rgba32Float);
-    blitter.copy(&gpu.device, &mut encoder, target.view(), wide.view());
-    gpu.queue.submit([encoder.finish()]);
-    read_rgba32float_blocking(&gpu.device, &gpu.queue, wide.view().texture()).unwrap()
+    pass.record(encoder, &mut resources, &inputs);
+    (pass, resources, target)
+}
+
+/// A tilted plane with photons strewn over it.
+fn strewn_plane(gpu: &Gpu, size: [u32; 2]) -> (Picture, Photons) {
+    let seen = DVec3::new(0.0, -0.1, 0.0);
+    let normal = DVec3::new(0.3, 0.8, 0.4).normalize();
+    let view = view(DVec3::new(0.1, 0.5, 0.9), seen, perspective(30.0), size);
+    let picture = picture(gpu, view, size, plane(seen, normal));
+    // Some 130 unit-length focal pixels: a kernel of 0.04 at distance 0.7 to 1.4 spans up to 14 of the 23 pixels.
+    let mut random = Random(17);
+    let (u, v) = (
+        normal.cross(DVec3::X).normalize(),
+        normal.cross(normal.cross(DVec3::X)).normalize(),
+    );
+    let hits: Vec<Photon> = (0..4000)
+        .map(|_| {
+            let mut along = || f64::from(random.unit()) - 0.5;
+            let position = seen + along() * u + along() * v;
+            Photon {
+                position: position.as_vec3().to_array(),
+                state: 1,
+                flux: [random.unit(), random.unit(), random.unit()],
+                density: 1.0,
+                normal: octahedral(normal),
+                direction: 0,
+                reflectance: 0,
+                light: 0,
+            }
+        })
+        .collect();
+    let photons = Photons::new(&gpu.device, hits.len() as u32, 1).unwrap();
+    let offset = hits.len() as u64 * PHOTON_BYTES;
+    gpu.queue
+        .write_buffer(photons.buffer(), offset, bytemuck::cast_slice(&hits));
+    (picture, photons)
+}
+
+/// The largest difference of a channel, over the largest channel of what is wanted.
+fn worst_difference<'a>(pairs: impl Iterator<Item = (&'a [f32; 4], &'a [f32; 4])>, wanted: &[[f32; 4]]) -> f32 {
+    let brightest = wanted.iter().flat_map(|t| &t[..3]).fold(0f32, |a, &b| a.max(b));
+    assert!(brightest > 0.0);
+    let differ = |(a, b): (&[f32; 4], &[f32; 4])| (0..3).fold(0f32, |w, c| w.max((a[c] - b[c]).abs()));
+    pairs.map(differ).fold(0f32, f32::max) / brightest
 }
 
 #[test]
 fn a_subsampled_estimate_is_the_full_one_where_its_samples_stand() {
     let Some(gpu) = gpu() else { return };
     for size in [[133, 91], [97, 70]] {
-        let seen = DVec3::new(0.0, -0.1, 0.0);
-        let normal = DVec3::new(0.3, 0.8, 0.4).normalize();
-        let view = view(DVec3::new(0.1, 0.5, 0.9), seen, perspective(30.0), size);
-        let picture = picture(&gpu, view, size, plane(seen, normal));
-        // Some 130 unit-length focal pixels: a kernel of 0.04 at distance 0.7 to 1.4 spans up to 14 of the 23 pixels.
-        let mut random = Random(17);
-        let (u, v) = (
-            normal.cross(DVec3::X).normalize(),
-            normal.cross(normal.cross(DVec3::X)).normalize(),
-        );
-        let hits: Vec<Photon> = (0..4000)
-            .map(|_| {
-                let mut along = || f64::from(random.unit()) - 0.5;
-                let position = seen + along() * u + along() * v;
-                Photon {
-                    position: position.as_vec3().to_array(),
-                    state: 1,
-                    flux: [random.unit(), random.unit(), random.unit()],
-                    density: 1.0,
-                    normal: octahedral(normal),
-                    direction: 0,
-                    reflectance: 0,
-                    light: 0,
-                }
-            })
-            .collect();
-        let photons = Photons::new(&gpu.device, hits.len() as u32, 1).unwrap();
-        let offset = hits.len() as u64 * PHOTON_BYTES;
-        gpu.queue
-            .write_buffer(photons.buffer(), offset, bytemuck::cast_slice(&hits));
+        let (picture, photons) = strewn_plane(&gpu, size);
         for shape in [SplatShape::Tiled, SplatShape::Quads] {
             let full = splat(&gpu, &picture, shape, Subsampling::Full, &photons);
-            let brightest = full.iter().flat_map(|t| &t[..3]).fold(0f32, |a, &b| a.max(b));
-            assert!(brightest > 0.0);
             for subsampling in FACTORS {
                 let coarse = splat(&gpu, &picture, shape, subsampling, &photons);
-                let mut worst = 0f32;
-                for (sample, found) in samples(subsampling, size).zip(&coarse) {
+                let pairs = samples(subsampling, size).zip(&coarse).filter_map(|(sample, found)| {
                     let at = subsampling.pixel(sample, size);
                     let held_back = [0, 1]
                         .iter()
                         .any(|&a| at[a] != sample[a] * subsampling.factor() + subsampling.factor() / 2);
-                    if shape == SplatShape::Quads && held_back {
-                        // Its documented limit.
-                        continue;
-                    }
-                    let wanted = full[(at[1] * size[0] + at[0]) as usize];
-                    worst = (0..3).fold(worst, |w, c| w.max((found[c] - wanted[c]).abs() / brightest));
-                }
+                    // Of quads a documented limit.
+                    let is_compared = shape == SplatShape::Tiled || !held_back;
+                    is_compared.then_some((found, &full[(at[1] * size[0] + at[0]) as usize]))
+                });
+                let worst = worst_difference(pairs, &full);
                 println!("{shape:?}, {size:?}, {subsampling:?}: off by {worst:.1e} of the brightest");
-                // Tiles round to 2^-31 of the brightest kernel in a tile, and tiles differ; a hundred kernels overlap.
-                // Quads add the same numbers in the same order.
+                // Tiles add in another order: some hundred kernels overlap. Quads add the same numbers in the same order.
                 let tolerance = if shape == SplatShape::Tiled { 1e-6 } else { 0.0 };
                 assert!(worst <= tolerance, "{shape:?}, {size:?}, {subsampling:?}: {worst}");
             }
+        }
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn what_is_estimated_anew_is_the_full_estimate() {
+    let Some(gpu) = gpu() else { return };
+    let size = [133, 91];
+    let (picture, photons) = strewn_plane(&gpu, size);
+    let full = splat(&gpu, &picture, SplatShape::Tiled, Subsampling::Full, &photons);
+    for subsampling in FACTORS {
+        let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        let (pass, mut resources, coarse) =
+            record_splat(&gpu, &picture, SplatShape::Tiled, subsampling, &photons, &mut encoder);
+        let fine = Irradiance::new(&gpu.device, size, wgpu::TextureFormat::Rgba32Float).unwrap();
+        let marked = MarkedPixels::new(&gpu.device, size).unwrap();
+        let settings = UpsamplerSettings {
+            disagreement: 0.02,
+            ..Default::default()
+        };
+        let inputs = UpsamplerInputs {
+            queue: &gpu.queue,
+            g_buffer: &picture.g_buffer,
+            coarse: &coarse,
+            subsampling,
+            target: Subsampling::Full,
+            irradiance: &fine,
+            marked: Some(&marked),
+            settings: &settings,
+            timestamps: None,
+        };
+        let mut upsampler = UpsamplerResources::new(&gpu.device).unwrap();
+        Upsampler::new(&gpu.device).record(&mut encoder, &mut upsampler, &inputs);
+        let inputs = MarkedSplatInputs {
+            queue: &gpu.queue,
+            g_buffer: &picture.g_buffer,
+            subsampling: Subsampling::Full,
+            irradiance: &fine,
+            marked: &marked,
+            timestamps: None,
+        };
+        pass.record_marked(&mut encoder, &mut resources, &inputs);
+        gpu.queue.submit([encoder.finish()]);
+        let found = read_rgba32float_blocking(&gpu.device, &gpu.queue, fine.view().texture()).unwrap();
+        let coarse = read_rgba32float_blocking(&gpu.device, &gpu.queue, coarse.view().texture()).unwrap();
+        let interpolated = upsample(&gpu, &picture.g_buffer, subsampling, &coarse);
+        let list = marked.read_blocking(&gpu.device, &gpu.queue).unwrap();
+        let index = |[x, y]: &[u32; 2]| (y * size[0] + x) as usize;
+        let worst = worst_difference(list.iter().map(|p| (&found[index(p)], &full[index(p)])), &full);
+        println!(
+            "{subsampling:?}: {} of {} marked, off by {worst:.1e}",
+            list.len(),
+            full.len()
+        );
+        assert!(
+            list.len() > 1000 && list.len() < full.len() - 100,
+            "{subsampling:?}: {}",
+            list.len()
+        );
+        // Another order of additions, and a normal that is not rounded to sixteen bits.
+        assert!(worst < 1e-4, "{subsampling:?}: {worst}");
+        let mut is_marked = vec![false; full.len()];
+        for pixel in &list {
+            is_marked[index(pixel)] = true;
+        }
+        for (i, &is_marked) in is_marked.iter().enumerate() {
+            assert!(is_marked || found[i] == interpolated[i], "{subsampling:?}, {i}");
+        }
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn pixels_are_marked_between_samples_that_disagree() {
+    let Some(gpu) = gpu() else { return };
+    let size = [61, 43];
+    let picture = ball_and_wall(&gpu, size);
+    for subsampling in FACTORS {
+        let texels = noise((subsampling.size(size)[0] * subsampling.size(size)[1]) as usize, 5);
+        let coarse = irradiance(&gpu, subsampling.size(size), &texels);
+        let target = subsampling.finer().unwrap();
+        let target_size = target.size(size);
+        for disagreement in [0.1f32, 0.5, 1.5] {
+            let fine = Irradiance::new(&gpu.device, target_size, wgpu::TextureFormat::Rgba32Float).unwrap();
+            let marked = MarkedPixels::new(&gpu.device, target_size).unwrap();
+            let settings = UpsamplerSettings {
+                disagreement,
+                ..Default::default()
+            };
+            let inputs = UpsamplerInputs {
+                queue: &gpu.queue,
+                g_buffer: &picture.g_buffer,
+                coarse: &coarse,
+                subsampling,
+                target,
+                irradiance: &fine,
+                marked: Some(&marked),
+                settings: &settings,
+                timestamps: None,
+            };
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            let mut upsampler = UpsamplerResources::new(&gpu.device).unwrap();
+            let pass = Upsampler::new(&gpu.device);
+            // Twice: the list begins anew.
+            pass.record(&mut encoder, &mut upsampler, &inputs);
+            pass.record(&mut encoder, &mut upsampler, &inputs);
+            gpu.queue.submit([encoder.finish()]);
+            let list = marked.read_blocking(&gpu.device, &gpu.queue).unwrap();
+            let mut undecided = 0;
+            let mut wanted = Vec::new();
+            for sample in samples(target, size) {
+                let pixel = target.pixel(sample, size);
+                match (picture.at(pixel), twin(&picture, subsampling, &texels, pixel).doubt) {
+                    (None, _) => {}
+                    (_, doubt) if (doubt - f64::from(disagreement)).abs() < 1e-3 => undecided += 1,
+                    (_, doubt) if doubt > f64::from(disagreement) => wanted.push(sample),
+                    _ => assert!(!list.contains(&sample), "{subsampling:?}, {disagreement}, {sample:?}"),
+                }
+            }
+            println!(
+                "{subsampling:?}, {disagreement}: {} wanted, {} marked",
+                wanted.len(),
+                list.len()
+            );
+            assert!(
+                wanted.iter().all(|sample| list.contains(sample)),
+                "{subsampling:?}, {disagreement}"
+            );
+            assert!(list.len() <= wanted.len() + undecided && undecided < 10);
         }
     }
     assert_no_errors(&gpu);
