@@ -15,6 +15,7 @@ mod common;
 use clap::Parser;
 use common::adapter::{Gpu, Wishes};
 use common::clock::Clock;
+use common::offline::wait;
 use common::sequence::Sequence;
 use common::{arguments, named_scene};
 use lightfall::glam::{DAffine3, DVec3, UVec2, Vec3, Vec3A};
@@ -196,7 +197,7 @@ impl<'a> Bench<'a> {
                         timestamps.resolve(&mut encoder);
                     }
                     queue.submit([encoder.finish()]);
-                    lightfall::read_buffer_blocking::<RayHit>(device, queue, list.hits()).map(drop)
+                    wait(device)
                 });
                 timed.map_err(|reason| lightfall::Error::ReadBack { what: "hits", reason })?;
             }

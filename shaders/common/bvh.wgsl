@@ -213,15 +213,16 @@ fn bvh_traverse(origin: vec3f, direction: vec3f, furthest: f32, mask: u32, first
             leaves = nodes;
             nodes = vec2u(0u);
         }
-        while leaves.y != 0u {
-            let bit = firstTrailingBit(leaves.y);
-            leaves.y &= leaves.y - 1u;
-            let leaf = leaves.x + bit;
-            if instance == BVH_NONE {
-                let met = bvh_instances[leaf].leaf;
-                if (bvh_instances[met].mask & mask) == 0u {
-                    continue;
+        if instance == BVH_NONE {
+            // The next instance that the ray may see. Not in the loop over triangles, where every turn would bear its cost.
+            while leaves.y != 0u && instance == BVH_NONE {
+                let met = bvh_instances[leaves.x + firstTrailingBit(leaves.y)].leaf;
+                leaves.y &= leaves.y - 1u;
+                if (bvh_instances[met].mask & mask) != 0u {
+                    instance = met;
                 }
+            }
+            if instance != BVH_NONE {
                 if nodes.y > ~BVH_NODE_BITS {
                     stack[depth] = nodes;
                     depth++;
@@ -230,12 +231,15 @@ fn bvh_traverse(origin: vec3f, direction: vec3f, furthest: f32, mask: u32, first
                     stack[depth] = leaves;
                     depth++;
                 }
-                instance = met;
                 instance_depth = depth;
                 ray = bvh_to_instance(unit_ray, instance);
                 nodes = vec2u(bvh_instances[instance].root, BVH_ROOT_BIT);
-                break;
+                leaves.y = 0u;
             }
+        }
+        while leaves.y != 0u {
+            let leaf = leaves.x + firstTrailingBit(leaves.y);
+            leaves.y &= leaves.y - 1u;
             let met = bvh_triangle(ray, leaf);
             hit.triangles_visited++;
             if met.x >= 0.0 && met.x < hit.distance && !bvh_is_hole(instance, leaf, met.yz) {
