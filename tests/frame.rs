@@ -984,3 +984,66 @@ fn maps_stay_where_they_were_placed_while_the_light_is_off() {
     assert_eq!(renderer.env_maps().unwrap().centers(), placed);
     assert_no_errors(&gpu);
 }
+
+#[test]
+fn a_subject_is_another_one_when_camera_light_or_geometry_have_changed() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::cornell(0.0);
+    let summary = SceneSummary::of(&scene).unwrap();
+    let mut renderer = GiRenderer::new(&gpu.device, &small()).unwrap();
+    let set = |renderer: &mut GiRenderer, lights: &[Light]| {
+        renderer.set_scene(&gpu.queue, &summary, lights).unwrap();
+    };
+    set(&mut renderer, &scene.lights);
+    let camera = &scene.cameras[0];
+    let first = renderer.subject(camera);
+    set(&mut renderer, &scene.lights);
+    renderer.set_changes(&[]);
+    assert_eq!(renderer.subject(camera), first, "nothing has changed");
+    let mut moved = camera.clone();
+    moved.transform.translation.x += 1e-12;
+    assert_ne!(renderer.subject(&moved), first);
+    let mut wider = camera.clone();
+    wider.projection = lightfall::scene::Projection::Perspective { fov_y: 0.9 };
+    assert_ne!(renderer.subject(&wider), first);
+    let mut seen = vec![first];
+    let mut lights = scene.lights.clone();
+    lights[0].color[1] *= 0.5;
+    set(&mut renderer, &lights);
+    seen.push(renderer.subject(camera));
+    renderer.geometry_changed();
+    seen.push(renderer.subject(camera));
+    renderer.set_changes(&[summary.bounds]);
+    seen.push(renderer.subject(camera));
+    seen.sort_unstable();
+    seen.dedup();
+    assert_eq!(seen.len(), 4);
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn an_accumulation_begins_anew_by_itself() {
+    let Some(gpu) = gpu() else { return };
+    let settings = Settings {
+        frames: 8,
+        tracer_kind: TracerKind::Bvh,
+        ..small()
+    };
+    let bright = samples::cornell(0.0);
+    let mut dim = bright.clone();
+    dim.lights[0].color = dim.lights[0].color.map(|c| 0.3 * c);
+    let new = |scene: &Scene| Offline::new(&gpu, scene.clone(), &settings, 0, [24, 16], Component::All).unwrap();
+    let render = |offline: &mut Offline<'_>, frames: u32| {
+        for _ in 0..frames {
+            offline.render_frame(None).unwrap();
+        }
+        offline.read().unwrap()
+    };
+    let mut changing = new(&bright);
+    let three = render(&mut changing, 3);
+    changing.set_scene(dim.clone()).unwrap();
+    let found = render(&mut changing, 2);
+    assert_eq!(found, render(&mut new(&dim), 2), "as if it had begun with the change");
+    assert_ne!(found, three);
+    assert_no_errors(&gpu);
+}

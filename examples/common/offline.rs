@@ -33,7 +33,6 @@ pub(crate) struct Offline<'a> {
     camera: usize,
     size: [u32; 2],
     composite: CompositeSettings,
-    frames: u32,
 }
 
 impl<'a> Offline<'a> {
@@ -78,37 +77,33 @@ impl<'a> Offline<'a> {
             camera,
             size,
             composite,
-            frames: 0,
         })
     }
 
-    /// Renders the next frame, as of a scene in motion, and waits for it.
+    /// Renders the next frame and waits for it: as of a scene in motion, unless frames are accumulated.
     pub(crate) fn render_frame(&mut self, timestamps: Option<&Timestamps>) -> Result<(), Error> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let frame = self.renderer.set_scene(queue, &self.summary, &self.scene.lights)?;
-        self.renderer.geometry_changed();
+        if self.accumulator.is_none() {
+            self.renderer.geometry_changed();
+        }
         if let Some(bvh) = &mut self.bvh {
             bvh.prepare(queue, &frame)?;
         }
         self.composite.output_scale = frame.output_scale(1.0)?;
-        let jitter = match self.accumulator {
-            Some(_) => CameraView::jitter(self.frames),
-            None => [0.0; 2],
-        };
-        let mut cameras = [CameraView::new(
-            &frame,
-            &self.scene.cameras[self.camera],
-            self.size,
-            jitter,
-        )];
+        let camera = &self.scene.cameras[self.camera];
+        let subject = self.renderer.subject(camera);
+        let accumulated = self
+            .accumulator
+            .as_mut()
+            .map(|(_, resources)| resources.follow(subject));
+        let jitter = accumulated.map_or([0.0; 2], CameraView::jitter);
+        let accumulated = accumulated.unwrap_or(0);
+        let mut cameras = [CameraView::new(&frame, camera, self.size, jitter)];
         self.renderer.prepare(queue, &mut self.geometry, &mut cameras)?;
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let geometry: &dyn Geometry = &self.geometry;
-        let sample_offset = if self.accumulator.is_some() {
-            self.frames.wrapping_mul(self.renderer.settings().photons)
-        } else {
-            0
-        };
+        let sample_offset = accumulated.wrapping_mul(self.renderer.settings().photons);
         let scene_inputs = SceneInputs {
             queue,
             geometry,
@@ -121,7 +116,7 @@ impl<'a> Offline<'a> {
             queue,
             geometry,
             view: &cameras[0],
-            accumulated: self.accumulator.as_ref().map_or(0, |(_, resources)| resources.frames()),
+            accumulated,
             composite: &self.composite,
             timestamps,
         };
@@ -138,7 +133,6 @@ impl<'a> Offline<'a> {
             timestamps.resolve(&mut encoder);
         }
         queue.submit([encoder.finish()]);
-        self.frames += 1;
         wait(device)
     }
 
@@ -152,10 +146,7 @@ impl<'a> Offline<'a> {
         }
         self.summary = SceneSummary::of(&scene)?;
         self.scene = scene;
-        self.frames = 0;
-        if let Some((_, resources)) = &mut self.accumulator {
-            resources.restart();
-        }
+        self.renderer.geometry_changed();
         Ok(())
     }
 

@@ -23,9 +23,10 @@ use crate::resource::{
     CameraView, CapturePurpose, CaptureView, DepthHierarchy, EnvMaps, GBuffer, Geometry, Irradiance, Lights,
     MarkedPixels, NearestOccluders, Photons, PrepareContext, Radiance, ShadowMaps, Subsampling, Visibility,
 };
-use crate::scene::{Light, LightKind, SceneBounds, SceneSummary, UnitFrame};
+use crate::scene::{Camera, Light, LightKind, Projection, SceneBounds, SceneSummary, UnitFrame};
 use crate::{Error, Timestamps};
 use glam::DVec3;
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// All passes and the resources that views share.
@@ -41,6 +42,8 @@ pub struct GiRenderer {
     placement: EnvMapPlacement,
     /// Changes whenever a resource that views bind is made anew; no two renderers share one.
     generation: u64,
+    /// Counts changes of light and geometry.
+    revision: u64,
     /// All views of the frame, indexed; the last `prepare` filled it.
     views: Vec<CaptureView>,
     light_views: std::ops::Range<usize>,
@@ -154,7 +157,8 @@ pub struct ViewInputs<'a> {
     /// One of the views that were prepared.
     pub view: &'a CameraView,
     /// Frames of this view that are in the mean already, where frames are accumulated: kernels narrow with them
-    /// ([`Settings::radius_alpha`]). 0 in real time, and again when the view, a light or geometry has changed.
+    /// ([`Settings::radius_alpha`]). 0 in real time; else what
+    /// [`AccumulatorResources::follow`](crate::pass::AccumulatorResources::follow) says.
     pub accumulated: u32,
     /// What to show; `output_scale` is taken as given, see [`UnitFrame::output_scale`].
     pub composite: &'a CompositeSettings,
@@ -201,6 +205,7 @@ impl GiRenderer {
             state: None,
             placement: EnvMapPlacement::default(),
             generation: next_generation(),
+            revision: 0,
             views: Vec::new(),
             light_views: 0..0,
             env_map_views: 0..0,
@@ -242,6 +247,10 @@ impl GiRenderer {
         };
         if self.state.as_ref().is_some_and(|s| reach(&s.lights) != reach(lights)) {
             self.placement.lights_changed();
+        }
+        let is_same = |s: &SceneState| s.lights == lights && s.frame.maps_like(&frame);
+        if !self.state.as_ref().is_some_and(is_same) {
+            self.revision += 1;
         }
         self.state = Some(SceneState {
             frame,
@@ -409,6 +418,7 @@ impl GiRenderer {
     /// is then kept up to date until it comes to rest. Call it before `prepare`; a change of the region is noticed without
     /// it.
     pub fn geometry_changed(&mut self) {
+        self.revision += 1;
         self.placement.geometry_changed();
     }
 
@@ -763,6 +773,21 @@ impl GiRenderer {
             Some(_) => {}
         }
         Ok(())
+    }
+
+    /// A number that stands for what a camera sees: another one when the camera, a light or geometry has changed, as far as
+    /// `set_scene`, [`GiRenderer::geometry_changed`] and [`GiRenderer::set_changes`] were told; the same whatever the jitter.
+    /// For [`AccumulatorResources::follow`](crate::pass::AccumulatorResources::follow).
+    pub fn subject(&self, camera: &Camera) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        self.revision.hash(&mut hasher);
+        let projection = match camera.projection {
+            Projection::Perspective { fov_y } => (0, fov_y),
+            Projection::Orthographic { half_height } => (1, half_height),
+        };
+        (projection.0, projection.1.to_bits()).hash(&mut hasher);
+        camera.transform.to_cols_array().map(f64::to_bits).hash(&mut hasher);
+        hasher.finish()
     }
 
     /// The settings it was made with.

@@ -1,7 +1,8 @@
 //! Plain mean of frames, in f32: with a jittered camera and fresh photons every frame, noise falls and edges smooth.
 //!
-//! Input: [`Radiance`] of a frame. Output: the mean so far. Cost: one full-screen pass and three textures. Limits: the
-//! bandwidth of the density estimate stays, so its blur stays.
+//! Input: [`Radiance`] of a frame. Output: the mean so far, in which each of n frames weighs 1/n; it begins anew when what it
+//! shows changes ([`AccumulatorResources::follow`]). Cost: one full-screen pass and three textures. Limits: blur of the
+//! density estimate falls only as far as its kernels narrow with the frames ([`progressive_scale`](super::progressive_scale)).
 
 use super::full_screen::{FullScreen, FullScreenResources};
 use crate::gpu::{self as device, Slot};
@@ -36,6 +37,8 @@ pub struct AccumulatorResources {
     sums: [wgpu::TextureView; 2],
     mean: Radiance,
     frames: u32,
+    /// What they show.
+    subject: Option<u64>,
     bytes: u64,
 }
 
@@ -110,10 +113,21 @@ impl AccumulatorResources {
             sums: [view()?, view()?],
             mean,
             frames: 0,
+            subject: None,
         })
     }
 
-    /// Forgets all frames: something changed.
+    /// Says what the next frame shows, by a number that is another one whenever that has changed:
+    /// [`GiRenderer::subject`](crate::frame::GiRenderer::subject), or a host's own. On another number than the last one all
+    /// frames are forgotten. Returns how many are in the mean.
+    pub fn follow(&mut self, subject: u64) -> u32 {
+        if self.subject.replace(subject).is_some_and(|last| last != subject) {
+            self.restart();
+        }
+        self.frames
+    }
+
+    /// Forgets all frames.
     pub fn restart(&mut self) {
         self.frames = 0;
     }
