@@ -116,6 +116,7 @@ impl Settings {
                 ..Default::default()
             },
             trace_method: TraceMethod::OrderedMarch,
+            upsampling: Upsampling::AtOnce,
             splatter: PhotonSplatterSettings {
                 bandwidth: Bandwidth::Density {
                     photons: 200.0,
@@ -135,7 +136,7 @@ impl Settings {
     pub fn balanced() -> Self {
         Self {
             frames: 1,
-            photons: 500_000,
+            photons: 400_000,
             bounces: 3,
             env_map_count: 12,
             env_maps_at_lights: 0,

@@ -1,8 +1,13 @@
-//! Up-sampling: irradiance at every pixel from an estimate at a part of them.
+//! Up-sampling: irradiance at every pixel, or at more of them, from an estimate at a part of them.
 //!
-//! Inputs: [`GBuffer`], coarse [`Irradiance`] of some [`Subsampling`]. Output: [`Irradiance`] (`rgba32float`) of the
-//! G-buffer's size. Source: Yao et al., soft shadows and image-space photon mapping, section 3.5 (joint bilateral
-//! interpolation between the four samples around a pixel).
+//! Inputs: [`GBuffer`], coarse [`Irradiance`] of some [`Subsampling`]. Outputs: [`Irradiance`] (`rgba32float`) of all pixels
+//! or of a finer [`Subsampling`], and on demand [`MarkedPixels`]: where the samples around a pixel leave in doubt what it
+//! shows, for [`PhotonSplatter::record_marked`](super::PhotonSplatter::record_marked). Sources: Yao et al., soft shadows and
+//! image-space photon mapping, section 3.5 (joint bilateral interpolation between the four samples around a pixel); Yao et
+//! al. 2010, section 6 (level by level, with pixels estimated anew).
+//!
+//! A pixel is marked where those of the four samples that fit differ by more than `disagreement` of their mean, where they
+//! weigh less than a quarter of what four do, and where none fits.
 //!
 //! A sample weighs as in bilinear interpolation, times how well its normal agrees, times how near it lies to the
 //! receiver's tangent plane, by geometric or shading normal. That plane stands for the paper's difference of depth, which
@@ -15,9 +20,9 @@
 //! Alpha of the output: 1 where samples fit, 0 where none did or where no surface is seen. There RGB is 0 as well, and
 //! where all sixteen samples miss every surface.
 //!
-//! Cost: pixels, whatever the factor; some thirty texel fetches each. Limits: detail finer than a block is lost, contact
-//! shadows among it; things that no sample sees take the colour of the best-fitting surface beside them; beyond the
-//! outermost samples the outermost counts alone.
+//! Cost: pixels, whatever the factor; some thirty texel fetches each. Limits: detail finer than a block is lost where
+//! nothing is estimated anew, contact shadows among it; things that no sample sees then take the colour of the best-fitting
+//! surface beside them; beyond the outermost samples the outermost counts alone.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::{GBuffer, Irradiance, MarkedPixels, Subsampling};

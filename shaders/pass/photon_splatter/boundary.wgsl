@@ -53,8 +53,7 @@ fn boundary_share(receiver: Receiver, radius: f32) -> f32 {
     for (var i = 0u; i < BOUNDARY_POINTS; i++) {
         let distance = radius * splat_kernel_radius((f32(i) + 0.5) / f32(BOUNDARY_POINTS));
         let turn = start + BOUNDARY_GOLDEN_ANGLE * f32(i);
-        let offset = distance * vec2f(cos(turn), sin(turn));
-        let y = receiver.position + offset.x * frame[0] + offset.y * frame[1];
+        let y = receiver.position + distance * (cos(turn) * frame[0] + sin(turn) * frame[1]);
         on += u32(boundary_goes_on(receiver, y, slab));
     }
     return max(f32(on) / f32(BOUNDARY_POINTS), BOUNDARY_LEAST);

@@ -1,7 +1,7 @@
 //! Density estimation: irradiance at each pixel from the photons around the surface point it sees.
 //!
-//! Inputs: [`Photons`], [`GBuffer`]. Output: [`Irradiance`] (`rgba32float`), at every pixel of the G-buffer or at a part of
-//! them ([`Subsampling`]); alpha is 1 where a surface is seen, else 0. E(x) = Σ Φ K(|x − x_p| / h) / h², K normalised over
+//! Inputs: [`Photons`], [`GBuffer`]. Output: [`Irradiance`] (`rgba32float`), at every pixel of the G-buffer, at a part of
+//! them ([`Subsampling`]), or anew at [`MarkedPixels`]; alpha is 1 where a surface is seen, else 0. E(x) = Σ Φ K(|x − x_p| / h) / h², K normalised over
 //! the unit disc; photons straight from a light are left out, for direct light is shaded by itself. Sources: Yao et al. 2010,
 //! section 6; Yao et al., soft shadows and image-space photon mapping, section 3.3; Mara et al. 2013 (tiles); Knaus and
 //! Zwicker 2011 ([`progressive_scale`]).
@@ -188,13 +188,13 @@ pub struct PhotonSplatterSettings {
 }
 
 impl Default for PhotonSplatterSettings {
-    /// Of 400 000 photons in a Cornell box, 600 under a kernel leave half the squared error of 150; fewer photons want fewer.
+    /// Of 400 000 photons in a Cornell box, 560 under a kernel leave half the squared error of 150; fewer photons want fewer.
     /// Densities above the uniform one are clamped because that of a single hop says little of how crowded a place is. See
     /// `docs/density.md`.
     fn default() -> Self {
         Self {
             bandwidth: Bandwidth::Density {
-                photons: 700.0,
+                photons: 560.0,
                 clamp: [0.25, 1.0],
             },
             max_radius: LARGEST_RADIUS,
