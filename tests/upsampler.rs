@@ -853,12 +853,12 @@ fn samples_stand_where_the_documentation_says_on_both_sides() {
 fn splat(
     gpu: &Gpu,
     picture: &Picture,
-    shape: SplatShape,
+    (shape, radius): (SplatShape, f32),
     subsampling: Subsampling,
     photons: &Photons,
 ) -> Vec<[f32; 4]> {
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
-    let (_, _, target) = record_splat(gpu, picture, shape, subsampling, photons, &mut encoder);
+    let (_, _, target) = record_splat(gpu, picture, (shape, radius), subsampling, photons, &mut encoder);
     gpu.queue.submit([encoder.finish()]);
     read_rgba32float_blocking(&gpu.device, &gpu.queue, target.view().texture()).unwrap()
 }
@@ -866,7 +866,7 @@ fn splat(
 fn record_splat(
     gpu: &Gpu,
     picture: &Picture,
-    shape: SplatShape,
+    (shape, radius): (SplatShape, f32),
     subsampling: Subsampling,
     photons: &Photons,
     encoder: &mut wgpu::CommandEncoder,
@@ -880,7 +880,7 @@ fn record_splat(
     let mut resources = PhotonSplatterResources::new(&gpu.device, &config, photons, size).unwrap();
     let target = Irradiance::new(&gpu.device, size, wgpu::TextureFormat::Rgba32Float).unwrap();
     let settings = PhotonSplatterSettings {
-        bandwidth: Bandwidth::Fixed(0.04),
+        bandwidth: Bandwidth::Fixed(radius),
         ..Default::default()
     };
     let inputs = PhotonSplatterInputs {
@@ -947,10 +947,14 @@ fn a_subsampled_estimate_is_the_full_one_where_its_samples_stand() {
     let Some(gpu) = gpu() else { return };
     for size in [[133, 91], [97, 70]] {
         let (picture, photons) = strewn_plane(&gpu, size);
-        for shape in [SplatShape::Tiled, SplatShape::Quads] {
-            let full = splat(&gpu, &picture, shape, Subsampling::Full, &photons);
+        // Down to kernels of a pixel or two of the coarsest samples.
+        for (shape, radius) in [SplatShape::Tiled, SplatShape::Quads]
+            .into_iter()
+            .flat_map(|s| [0.04, 0.02, 0.01].map(|r| (s, r)))
+        {
+            let full = splat(&gpu, &picture, (shape, radius), Subsampling::Full, &photons);
             for subsampling in FACTORS {
-                let coarse = splat(&gpu, &picture, shape, subsampling, &photons);
+                let coarse = splat(&gpu, &picture, (shape, radius), subsampling, &photons);
                 let pairs = samples(subsampling, size).zip(&coarse).filter_map(|(sample, found)| {
                     let at = subsampling.pixel(sample, size);
                     let held_back = [0, 1]
@@ -961,10 +965,13 @@ fn a_subsampled_estimate_is_the_full_one_where_its_samples_stand() {
                     is_compared.then_some((found, &full[(at[1] * size[0] + at[0]) as usize]))
                 });
                 let worst = worst_difference(pairs, &full);
-                println!("{shape:?}, {size:?}, {subsampling:?}: off by {worst:.1e} of the brightest");
+                println!("{shape:?}, {radius}, {size:?}, {subsampling:?}: off by {worst:.1e} of the brightest");
                 // Tiles add in another order: some hundred kernels overlap. Quads add the same numbers in the same order.
                 let tolerance = if shape == SplatShape::Tiled { 1e-6 } else { 0.0 };
-                assert!(worst <= tolerance, "{shape:?}, {size:?}, {subsampling:?}: {worst}");
+                assert!(
+                    worst <= tolerance,
+                    "{shape:?}, {radius}, {size:?}, {subsampling:?}: {worst}"
+                );
             }
         }
     }
@@ -976,11 +983,17 @@ fn what_is_estimated_anew_is_the_full_estimate() {
     let Some(gpu) = gpu() else { return };
     let size = [133, 91];
     let (picture, photons) = strewn_plane(&gpu, size);
-    let full = splat(&gpu, &picture, SplatShape::Tiled, Subsampling::Full, &photons);
+    let full = splat(&gpu, &picture, (SplatShape::Tiled, 0.04), Subsampling::Full, &photons);
     for subsampling in FACTORS {
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        let (pass, mut resources, coarse) =
-            record_splat(&gpu, &picture, SplatShape::Tiled, subsampling, &photons, &mut encoder);
+        let (pass, mut resources, coarse) = record_splat(
+            &gpu,
+            &picture,
+            (SplatShape::Tiled, 0.04),
+            subsampling,
+            &photons,
+            &mut encoder,
+        );
         let fine = Irradiance::new(&gpu.device, size, wgpu::TextureFormat::Rgba32Float).unwrap();
         let marked = MarkedPixels::new(&gpu.device, size).unwrap();
         let settings = UpsamplerSettings {

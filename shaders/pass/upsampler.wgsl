@@ -1,4 +1,4 @@
-// Irradiance at every pixel from samples at a part of them: joint bilateral interpolation (Yao et al., soft shadows and
+// Irradiance at more pixels from samples at a part of them: joint bilateral interpolation (Yao et al., soft shadows and
 // image-space photon mapping, section 3.5), with the distance from the receiver's tangent plane in the place of depth.
 
 struct Params {

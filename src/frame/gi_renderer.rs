@@ -172,7 +172,8 @@ impl GiRenderer {
         PhotonSplatter::required_features(&settings.splatter_config)
     }
 
-    /// Limits that suffice for any settings: the defaults. Large photon counts may ask for larger storage buffers.
+    /// Limits that suffice for any settings: the defaults. Large photon counts, and images of more than 33 million pixels, may
+    /// ask for larger storage buffers.
     pub fn required_limits() -> wgpu::Limits {
         wgpu::Limits::default()
     }
@@ -332,6 +333,8 @@ impl GiRenderer {
     fn renew_centers(&mut self, queue: &wgpu::Queue) -> Result<(), Error> {
         self.selection = None;
         if let Some(env_maps) = self.indirect.as_mut().and_then(IndirectScene::env_maps_mut) {
+            // Without maps there was no light but the first hits'.
+            self.revision += u64::from(env_maps.centers().is_empty());
             env_maps.forget_centers();
         }
         self.apply_centers(queue)
@@ -410,6 +413,7 @@ impl GiRenderer {
                 found: centers.len(),
             });
         }
+        self.revision += 1;
         self.placement.set_centers(centers);
         self.renew_centers(queue)
     }
@@ -776,11 +780,12 @@ impl GiRenderer {
     }
 
     /// A number that stands for what a camera sees: another one when the camera, a light or geometry has changed, as far as
-    /// `set_scene`, [`GiRenderer::geometry_changed`] and [`GiRenderer::set_changes`] were told; the same whatever the jitter.
+    /// `set_scene`, [`GiRenderer::geometry_changed`] and [`GiRenderer::set_changes`] were told, when the first environment maps
+    /// have their places, and in another renderer; the same whatever the jitter, and while maps are moved to better places.
     /// For [`AccumulatorResources::follow`](crate::pass::AccumulatorResources::follow).
     pub fn subject(&self, camera: &Camera) -> u64 {
         let mut hasher = DefaultHasher::new();
-        self.revision.hash(&mut hasher);
+        (self.generation, self.revision).hash(&mut hasher);
         let projection = match camera.projection {
             Projection::Perspective { fov_y } => (0, fov_y),
             Projection::Orthographic { half_height } => (1, half_height),

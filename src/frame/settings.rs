@@ -90,9 +90,9 @@ pub struct Settings {
     pub radius_alpha: f32,
     /// At which pixels irradiance is estimated; the others are interpolated.
     pub subsampling: Subsampling,
-    /// At once or level by level.
+    /// Whether at once or level by level.
     pub upsampling: Upsampling,
-    /// Between which pixels they are.
+    /// Between which pixels, and where in doubt.
     pub upsampler: UpsamplerSettings,
 }
 

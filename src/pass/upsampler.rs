@@ -56,7 +56,8 @@ pub(crate) const SLOTS: [Slot; 8] = [
     Slot::StorageMut,
 ];
 
-/// Which samples a pixel takes. Neither field costs time.
+/// Which samples a pixel takes, and which pixels are marked. The fields cost no time here; what is marked costs time where it
+/// is estimated anew.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct UpsamplerSettings {
     /// Cosine between the shading normals of pixel and sample at and below which the sample is left out, below 1; its

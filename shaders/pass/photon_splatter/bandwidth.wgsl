@@ -1,7 +1,7 @@
 // How wide a photon's kernel is. The shape brings `bin_count(bin) -> u32`.
 
 // Bins to each side of a photon's that its density is taken from.
-const BINS_AROUND: i32 = 2;
+const BINS_AROUND: i32 = 5;
 
 // Photons per area in the bins around a photon, by the area that the bins cover on its plane.
 fn bin_density(b: Bandwidth, photon: Photon) -> f32 {

@@ -23,7 +23,7 @@ const BANDWIDTH_BIN: u32 = 2u;
 // Pixels of the irradiance along a bin's side. Twin of `BIN`.
 const BIN: u32 = 1u;
 // Bins beyond the rim on each side: photons out there reach in. Twin of `BORDER`.
-const BORDER: u32 = 12u;
+const BORDER: u32 = 24u;
 
 fn bin_grid(b: Bandwidth) -> vec2u {
     return (subsampling_size(view.size, b.factor) + BIN - 1u) / BIN + 2u * BORDER;

@@ -57,7 +57,9 @@ fn gather_gap(low: f32, high: f32, bin: i32) -> f32 {
 
 fn gather_reaches(low: vec2f, high: vec2f, bin: vec2i, columns: i32) -> bool {
     let gap = max(gather_gap(low.x, high.x, bin.x), gather_gap(low.y, high.y, bin.y));
-    return f32(reach[bin.y * columns + bin.x]) >= f32(REACH_STEPS) * gap;
+    // No photon reaches 0 steps.
+    let steps = reach[bin.y * columns + bin.x];
+    return steps > 0u && f32(steps) >= f32(REACH_STEPS) * gap;
 }
 
 // Adds up all photons that may reach receivers within [low, high], in pixels of the irradiance that photons were sorted for.

@@ -8,7 +8,7 @@
 @group(0) @binding(5) var receivers: texture_2d<u32>;
 @group(0) @binding(6) var sums: texture_storage_2d<rgba32float, write>;
 
-// Pixels along the side of what a workgroup gathers: 2 x 2 blocks of 8 x 8, of which each invocation has 2 x 2.
+// Pixels along the side of what a workgroup gathers: each invocation has 2 x 2.
 const TILE: u32 = 16u;
 
 alias Receivers = vec4f;
@@ -39,16 +39,24 @@ fn gather_sums(g: Gathered) -> array<vec4f, 4> {
 
 @compute @workgroup_size(64)
 fn gather_tiles(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
-    let block = lane / 16u;
-    let own = TILE * group.xy + 8u * vec2u(block % 2u, block / 2u) + 2u * vec2u(lane % 4u, (lane / 4u) % 4u);
-    let size = subsampling_size(view.size, params.bandwidth.factor);
+    // Invocations next to each other have pixels close to each other.
+    let block = vec2u(lane / 16u % 2u, lane / 32u);
+    let own = TILE * group.xy + 8u * block + 2u * vec2u(lane % 4u, lane / 4u % 4u);
+    let b = params.bandwidth;
+    let size = subsampling_size(view.size, b.factor);
+    if any(own >= size) {
+        return;
+    }
     var seen: array<Receiver, 4>;
     for (var i = 0u; i < 4u; i++) {
         let pixel = min(own + vec2u(i % 2u, i / 2u), size - 1u);
         seen[i] = receiver_unpack(textureLoad(receivers, pixel, 0));
     }
     var g = gather_start(seen);
-    gather_photons(&g, vec2f(own) + 0.5, vec2f(own) + 1.5);
+    // Where they stand: the last ones of an axis may stand closer than one pixel of the irradiance.
+    let low = irradiance_place(b, vec2f(subsampling_pixel(own, b.factor, view.size)) + 0.5);
+    let high = irradiance_place(b, vec2f(subsampling_pixel(min(own + 1u, size - 1u), b.factor, view.size)) + 0.5);
+    gather_photons(&g, low, high);
     var found = gather_sums(g);
     for (var i = 0u; i < 4u; i++) {
         let pixel = own + vec2u(i % 2u, i / 2u);

@@ -1,5 +1,5 @@
 // Density estimation by gathering: photons are sorted by the bin of the screen that they project to, in the order of their
-// slots, and each block of pixels adds up the photons of the bins around it (Mara et al. 2013, tiled photon gathering). The
+// slots, and each pixel adds up the photons of the bins around it (Mara et al. 2013, tiled photon gathering). The
 // order of additions is fixed: the same photons give the same bits.
 
 @group(0) @binding(0) var<uniform> params: TiledParams;
@@ -78,27 +78,29 @@ fn find_bins(@builtin(global_invocation_id) id: vec3u) {
     slots[index] = index;
 }
 
-// Where the photons of each bin begin, once they are sorted.
+// Where the photons of each bin begin, once they are sorted: the first whose bin is no lower. One invocation a bin, and one
+// for where those of the last end.
 @compute @workgroup_size(64)
-fn find_first(@builtin(global_invocation_id) id: vec3u) {
-    let index = slot_of(id);
-    if index >= params.slot_count {
+fn find_first(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let bin = 64u * (group.y * groups.x + group.x) + lane;
+    if bin > bin_total() {
         return;
     }
-    let bins = bin_total();
-    let own = min(keys[index], bins);
-    var bin = 0u;
-    if index > 0u {
-        bin = min(keys[index - 1u], bins) + 1u;
-    }
-    for (; bin <= own; bin++) {
-        first_splats[bin] = index;
-    }
-    if index == params.slot_count - 1u {
-        for (bin = own + 1u; bin <= bins; bin++) {
-            first_splats[bin] = params.slot_count;
+    var low = 0u;
+    var high = params.slot_count;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if keys[middle] < bin {
+            low = middle + 1u;
+        } else {
+            high = middle;
         }
     }
+    first_splats[bin] = low;
 }
 
 fn bin_count(bin: u32) -> u32 {

@@ -77,11 +77,11 @@ pub(crate) const FINISH_SLOTS: [Slot; 8] = [
 
 const RECEIVER_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Uint;
 
-/// Pixels of the irradiance along the side of a bin. Twin of `BIN` in `bandwidth.wgsl`.
+/// Pixels of the irradiance along the side of a bin. Twin of `BIN` in `bins.wgsl`.
 pub(crate) const BIN: u32 = 1;
 
 /// Bins beyond each rim of the image. Twin of `BORDER`.
-pub(crate) const BORDER: u32 = 12;
+pub(crate) const BORDER: u32 = 24;
 
 /// Largest kernel radius, pixels, that the border holds, with a pixel of slack.
 pub(crate) const LARGEST_RADIUS: f32 = 23.0;
@@ -89,8 +89,8 @@ pub(crate) const LARGEST_RADIUS: f32 = 23.0;
 /// How a photon's kernel is drawn. All give the same light, but for rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SplatShape {
-    /// Photons are sorted into bins of the screen and gathered in f32, in a fixed order: any number of photons a pixel, the
-    /// same bits every frame.
+    /// Photons are sorted into bins of the screen and gathered in f32, in a fixed order: the same bits every frame. Up to
+    /// 3 200 000 photons, all hops but the first together.
     #[default]
     Tiled,
     /// Blended quads in the surface plane. Surfaces that stand on it within the kernel, as beyond a crease of less than 45°,
@@ -423,12 +423,14 @@ impl PhotonSplatter {
         resources: &mut PhotonSplatterResources,
         inputs: &MarkedSplatInputs<'_>,
     ) {
+        encoder.push_debug_group("lightfall::PhotonSplatter::marked");
         let size = inputs.subsampling.size(inputs.g_buffer.size());
         if let (Shape::Tiled(tiled), ShapeBuffers::Tiled(buffers)) = (&self.shape, &mut resources.shape)
             && inputs.marked.size() == size
         {
             tiled.record_marked(&self.device, encoder, buffers, inputs);
         }
+        encoder.pop_debug_group();
     }
 
     fn find_receivers(
@@ -600,7 +602,7 @@ fn splatted_slots(photons: &Photons) -> u32 {
     slots
 }
 
-/// Bins along both axes of irradiance of this size. Twin of `bin_grid` in `bandwidth.wgsl`.
+/// Bins along both axes of irradiance of this size. Twin of `bin_grid` in `bins.wgsl`.
 fn bin_grid(size: [u32; 2]) -> [u32; 2] {
     size.map(|length| length.div_ceil(BIN) + 2 * BORDER)
 }

@@ -1,4 +1,4 @@
-//! The tiled shape: photons sorted into bins of the screen, and gathered by blocks of pixels.
+//! The tiled shape: photons sorted into bins of the screen, and gathered by pixels.
 
 use super::sort::{SortBuffers, StableSort};
 use super::{MarkedSplatInputs, PhotonSplatterInputs, bin_total, gpu as shared, is_corrected, splatted_slots};
@@ -82,9 +82,9 @@ pub(crate) const MARKED_SLOTS: [Slot; 10] = [
 /// Pixels along the side of what a workgroup gathers. Twin of `TILE` in `gather_tiled.wgsl`.
 pub(crate) const TILE: u32 = 16;
 
-/// Most photons that are gathered, all hops but the first together: 64 in each of 60 000 turns. llvmpipe ends a shader's
-/// loops after 65 535 turns in all.
-const MOST_SPLATS: u32 = 64 * 60_000;
+/// Most photons that are gathered, all hops but the first together: 64 in each of 50 000 turns. llvmpipe ends a shader's
+/// loops after 65 535 turns in all, some of which go to finding bins.
+const MOST_SPLATS: u32 = 64 * 50_000;
 
 /// Its pipelines.
 #[derive(Debug)]
@@ -238,9 +238,10 @@ impl Tiled {
             self.sort
                 .record(device, inputs.queue, &mut pass, &mut buffers.sort, slots);
             pass.set_bind_group(0, &sorted, &[]);
-            for pipeline in [&self.find_first, &self.prepare] {
+            let ([x, y], _) = dispatch_64(bin_total(size) + 1);
+            for (pipeline, [x, y]) in [(&self.find_first, [x, y]), (&self.prepare, groups)] {
                 pass.set_pipeline(pipeline);
-                pass.dispatch_workgroups(groups[0], groups[1], 1);
+                pass.dispatch_workgroups(x, y, 1);
             }
         }
         let label = "lightfall::PhotonSplatter::gather";
@@ -312,6 +313,7 @@ impl TiledBuffers {
 
     pub(super) fn new(device: &wgpu::Device, slots: u32, size: [u32; 2]) -> Result<Self, Error> {
         use wgpu::BufferUsages as U;
+        Self::check(device, slots)?;
         let [splats, bins] = sizes(slots, size);
         let buffer = |label, bytes| device::buffer(device, label, bytes, U::STORAGE | U::COPY_DST);
         let marked = || -> Result<_, Error> {
