@@ -13,7 +13,7 @@ mod common;
 mod plug_one_stage;
 
 use common::{Gpu, assert_no_errors, gpu};
-use lightfall::frame::{GiRenderer, SceneInputs, Settings, ViewInputs};
+use lightfall::frame::{GiRenderer, SceneInputs, Settings, Upsampling, ViewInputs};
 use lightfall::glam::{DVec3, Mat4, Vec3};
 use lightfall::pass::{
     Bandwidth, BoundaryCorrection, Composite, CompositeInputs, CompositeResources, CompositeSettings, EnvMapCapture,
@@ -166,6 +166,7 @@ fn composed(engine: &Engine, subsampling: Subsampling) -> Composed {
         shadow_map_size: 128,
         subsampling,
         splatter: splatting(),
+        upsampling: Upsampling::AtOnce,
         ..Settings::balanced()
     };
     let mut geometry = MeshGeometry::new(device, queue, &scene).unwrap();
