@@ -136,7 +136,7 @@ impl Settings {
     pub fn balanced() -> Self {
         Self {
             frames: 1,
-            photons: 400_000,
+            photons: 500_000,
             bounces: 3,
             env_map_count: 12,
             env_maps_at_lights: 0,

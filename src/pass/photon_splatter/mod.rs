@@ -188,13 +188,13 @@ pub struct PhotonSplatterSettings {
 }
 
 impl Default for PhotonSplatterSettings {
-    /// Of 400 000 photons in a Cornell box, 560 under a kernel leave half the squared error of 150; fewer photons want fewer.
+    /// Of 400 000 photons in a Cornell box, 600 under a kernel leave half the squared error of 150; fewer photons want fewer.
     /// Densities above the uniform one are clamped because that of a single hop says little of how crowded a place is. See
     /// `docs/density.md`.
     fn default() -> Self {
         Self {
             bandwidth: Bandwidth::Density {
-                photons: 560.0,
+                photons: 700.0,
                 clamp: [0.25, 1.0],
             },
             max_radius: LARGEST_RADIUS,
