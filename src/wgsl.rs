@@ -241,6 +241,7 @@ pub(crate) const PHOTON_SPLATTER_FINISH: &str = compose![
 
 pub(crate) const UPSAMPLER: &str = compose![
     "pass/upsampler.wgsl",
+    "common/lost_rays.wgsl",
     "common/g_buffer.wgsl",
     "common/subsampling.wgsl",
     "common/octahedral.wgsl",

@@ -231,7 +231,5 @@ fn upsample_pixels(@builtin(global_invocation_id) id: vec3u, @builtin(local_invo
 // What an indirect dispatch needs.
 @compute @workgroup_size(1)
 fn count_marks() {
-    let groups = (atomicLoad(&marked.count) + 63u) / 64u;
-    let rows = (groups + 65534u) / 65535u;
-    marked.workgroups = array<u32, 3>(min(groups, 65535u), rows, 1u);
+    marked.workgroups = lost_rays_workgroups(atomicLoad(&marked.count));
 }
