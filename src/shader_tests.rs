@@ -319,14 +319,14 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::TONE_MAP, "Params", tone_map::gpu::Params { exposure, curve, inverse_gamma }),
         twin!(wgsl::ENV_MAP_SELECTOR, "Params", env_map_selector::gpu::Params {
             candidate_count, columns, limit, tag, back_face_limit, clearance, tolerance, coverage_target,
-            sample_count, least_gain,
+            sample_count, least_gain, slot_count,
         }),
         twin!(wgsl::ENV_MAP_SELECTOR_SAMPLES, "SurfaceSample", env_map_selector::gpu::SurfaceSample { position, normal }),
         twin!(wgsl::ENV_MAP_SELECTOR, "Sight", env_map_selector::gpu::SightRecord {
             surfaces, back_faces, nearest, is_valid, area, unseen, own, exchange,
         }),
         twin!(wgsl::ENV_MAP_SELECTOR, "Selection", env_map_selector::gpu::SelectionRecord {
-            tag, selected, newest, is_done, is_stable, swaps, coverage, pad, chosen,
+            tag, selected, newest, is_done, is_stable, swaps, coverage, total, chosen,
         }),
         twin!(wgsl::TRACE_STATISTICS, "Params", trace_statistics::gpu::Params { photon_count }),
         twin!(wgsl::TRACE_STATISTICS, "Sums", trace_statistics::gpu::Sums { stored, tentative, absorbed, escaped, lost }),

@@ -320,6 +320,7 @@ pub(crate) const TONE_MAP: &str = compose!["pass/tone_map.wgsl", "common/full_sc
 
 pub(crate) const ENV_MAP_SELECTOR: &str = compose![
     "pass/env_map_selector/select_maps.wgsl",
+    "pass/env_map_selector/params.wgsl",
     "pass/env_map_selector/samples.wgsl",
     "pass/env_map_selector/candidate.wgsl",
     "common/surface_sample.wgsl",
@@ -331,9 +332,15 @@ pub(crate) const ENV_MAP_SELECTOR: &str = compose![
 
 pub(crate) const ENV_MAP_SELECTOR_SAMPLES: &str = compose![
     "pass/env_map_selector/pick_samples.wgsl",
+    "pass/env_map_selector/params.wgsl",
+    "pass/env_map_selector/candidate.wgsl",
     "common/surface_sample.wgsl",
+    "common/surface_texel.wgsl",
     "common/photon.wgsl",
+    "common/hash.wgsl",
     "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
 ];
 
 pub(crate) const ENV_MAP_SELECTOR_CLEAR: &str =

@@ -3,17 +3,18 @@
 
 mod common;
 
+use bytemuck::Zeroable;
 use common::meshes::room;
 use common::statistics::Random;
 use common::{Gpu, assert_no_errors, gpu};
 use lightfall::frame::{GiRenderer, SceneInputs, Settings, ViewInputs, ViewResources};
-use lightfall::glam::{DAffine3, DVec3, Vec3};
+use lightfall::glam::{DAffine3, DVec2, DVec3, Vec3};
 use lightfall::pass::{
     CompositeSettings, CoverageMeasure, EnvMapSelector, EnvMapSelectorResources, EnvMapSelectorSettings,
     SelectBlockingInputs, Selection, Sight,
 };
 use lightfall::resource::cube_face::CUBE_FACES;
-use lightfall::resource::{CameraView, MeshGeometry};
+use lightfall::resource::{CameraView, MeshGeometry, Photon, PhotonState, Photons};
 use lightfall::scene::{Instance, Light, LightKind, Mesh, Scene, SceneSummary, UnitFrame, samples};
 use lightfall::{creation_count, read_rgba32float_blocking, wgpu};
 
@@ -55,6 +56,24 @@ impl<'a> Bench<'a> {
     ) -> (Selection, Vec<Sight>) {
         let mut resources = EnvMapSelectorResources::new(&self.gpu.device, candidates.len() as u32).unwrap();
         self.select_into(&mut resources, candidates, limit, settings)
+    }
+
+    /// By what these photons reach, and what is seen from there.
+    fn select_by(&mut self, photons: &Photons, candidates: &[Vec3], limit: u32) -> Selection {
+        let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        let mut resources = EnvMapSelectorResources::new(device, candidates.len() as u32).unwrap();
+        resources.set_candidates(queue, candidates).unwrap();
+        let inputs = SelectBlockingInputs {
+            queue,
+            frame: &self.frame,
+            limit,
+            tag: 1,
+            photons: Some(photons),
+            settings: &EnvMapSelectorSettings::default(),
+        };
+        self.selector
+            .select_blocking(&mut resources, &inputs, &mut self.geometry)
+            .unwrap()
     }
 
     fn select_into(
@@ -357,6 +376,64 @@ fn greedy_selection_sees_more_than_chance() {
             );
             assert!(ours > mean, "{name}, k = {k}");
         }
+    }
+    assert_no_errors(&gpu);
+}
+
+/// Photons that arrived at these points, world space, with their normals.
+fn photons_at(gpu: &Gpu, frame: &UnitFrame, points: &[(DVec3, DVec3)]) -> Photons {
+    let records: Vec<Photon> = points
+        .iter()
+        .map(|&(p, n)| Photon {
+            position: frame.point(p).to_array(),
+            state: PhotonState::Stored as u32,
+            normal: Photon::pack_unit_vector(n.as_vec3()),
+            ..Zeroable::zeroed()
+        })
+        .collect();
+    let photons = Photons::new(&gpu.device, records.len() as u32, 0).unwrap();
+    gpu.queue
+        .write_buffer(photons.buffer(), 0, bytemuck::cast_slice(&records));
+    photons
+}
+
+/// Photons reach only what maps see, so a place that no map sees looks dark: it gets a map all the same.
+#[test]
+fn what_no_photon_reaches_is_seen_too_if_it_lies_where_light_is() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::cornell(0.0);
+    let mut bench = Bench::new(&gpu, &scene);
+    let candidates = bench.candidates(100);
+    let triangles = Triangles::of(&scene);
+    let points = triangles.samples(60_000, &mut Random(5));
+    #[expect(clippy::approx_constant, reason = "a corner that was measured so")]
+    let walls: [[[f64; 2]; 4]; 2] = [
+        [[1.30, 0.65], [0.82, 2.25], [2.40, 2.72], [2.90, 1.14]],
+        [[4.23, 2.47], [2.65, 2.96], [3.14, 4.56], [4.72, 4.06]],
+    ];
+    for (block, face) in (0..8).map(|i| (i / 4, i % 4)) {
+        let [a, b] = [0, 1].map(|k| DVec2::from(walls[block][(face + k) % 4]));
+        let side = (b - a).perp().normalize();
+        let is_dark = |&&(p, n): &&(DVec3, DVec3)| {
+            let (p, n) = (DVec2::new(p.x, p.z), DVec2::new(n.x, n.z));
+            (p - a).dot(side).abs() < 1e-3 && n.dot(side).abs() > 0.999
+        };
+        let dark: Vec<_> = points.iter().filter(is_dark).copied().collect();
+        let lit: Vec<_> = points.iter().filter(|p| !is_dark(p)).copied().collect();
+        assert!(dark.len() > 300, "block {block}, face {face}: {} points", dark.len());
+        let photons = photons_at(&gpu, &bench.frame, &lit);
+        let selection = bench.select_by(&photons, &candidates, 3);
+        let eyes: Vec<DVec3> = selection.centers.iter().map(|&c| bench.frame.world_point(c)).collect();
+        let seen = dark
+            .iter()
+            .filter(|&&(p, n)| eyes.iter().any(|&eye| triangles.sees(eye, p, n)));
+        let share = seen.count() as f64 / dark.len() as f64;
+        println!(
+            "block {block}, face {face} dark: {} maps see {:.1} % of it",
+            eyes.len(),
+            100.0 * share
+        );
+        assert!(share > 0.9);
     }
     assert_no_errors(&gpu);
 }

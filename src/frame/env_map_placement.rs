@@ -1,10 +1,11 @@
-//! Where environment maps stand, and when the selection of their places is brought up to date.
+//! Where environment maps stand.
 //!
 //! A selection starts with the first frame, by area, and arrives a frame or two later; until then maps stand at the first
 //! candidates, those at invalid ones switched off. Once a frame has traced photons, places are selected anew by what these
-//! reach. After geometry has changed, a part of the candidates is captured anew
-//! each frame, and each full round ends with a maintenance step, until nothing changes any more.
+//! reach. After geometry has changed, a part of the candidates is captured anew each frame, and each full round ends with a
+//! maintenance step, until nothing changes any more.
 
+use super::selection_schedule::{SelectionSchedule, Work};
 use crate::pass::{
     CoverageMeasure, EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings,
     SelectBlockingInputs, Selection, SelectionStep,
@@ -13,22 +14,10 @@ use crate::resource::{CaptureView, EnvMaps, Geometry, Photons};
 use crate::scene::{SceneBounds, UnitFrame};
 use crate::{Error, Timestamps};
 use glam::{DVec3, Vec3};
-use std::ops::Range;
 
 /// The region's corners may move by this share of its diagonal before candidates are spread anew: a moving object at the
 /// border must not restart the selection every frame.
 const REGION_SLACK: f64 = 0.1;
-
-/// How often places are selected by photons before they are maintained: first by photons that were traced through maps in
-/// places chosen by area, then through better ones.
-pub(super) const PHOTON_ROUNDS: u32 = 2;
-
-/// Frames in which photons may arrive nowhere before places are left as they are.
-const MOST_FAILURES: u32 = 4;
-
-/// Rounds of maintenance after the last change if the selection does not come to rest; two to five suffice (Yao et al.
-/// 2010, section 4.1).
-const MOST_ROUNDS: u32 = 8;
 
 /// Centres of the maps, and the selection that finds them.
 #[derive(Debug, Default)]
@@ -51,34 +40,7 @@ struct OngoingSelection {
     frame: UnitFrame,
     /// The region as of the last frame.
     last_region: SceneBounds,
-    /// Whether the next frame selects anew.
-    is_pending: bool,
-    /// Selections still to be made by photons.
-    photon_rounds: u32,
-    /// Frames until the next of them, so that its photons were traced through the maps of the one before; `None`: that has
-    /// not arrived yet.
-    photons_in: Option<u32>,
-    /// Selections by photons that found none so far.
-    failures: u32,
-    /// The last step that selected anew; what arrives of earlier ones says nothing of it.
-    awaited: u32,
-    /// Whether there is anything to maintain.
-    is_started: bool,
-    /// Rounds of maintenance still to go; 0: at rest.
-    rounds: u32,
-    /// Parts of this round captured so far.
-    part: u32,
-    /// Number of the next step.
-    tag: u32,
-    /// The first step that sees the geometry as it is now.
-    settles_from: u32,
-}
-
-/// One frame's share of a selection.
-#[derive(Debug, Clone)]
-pub(super) struct Work {
-    candidates: Range<usize>,
-    step: SelectionStep,
+    schedule: SelectionSchedule,
 }
 
 /// What a selection needs to know of the frame.
@@ -125,7 +87,7 @@ impl EnvMapPlacement {
         if !ongoing.fits(context) {
             ongoing.spread_candidates(context)?;
         } else if ongoing.last_region != *context.region {
-            ongoing.geometry_changed();
+            ongoing.schedule.geometry_changed();
         }
         ongoing.last_region = *context.region;
         Ok(())
@@ -134,15 +96,14 @@ impl EnvMapPlacement {
     /// Notes that geometry is not as it was in the frame before.
     pub(super) fn geometry_changed(&mut self) {
         if let Some(ongoing) = &mut self.ongoing {
-            ongoing.geometry_changed();
+            ongoing.schedule.geometry_changed();
         }
     }
 
     /// Notes that light reaches other places than in the frame before.
     pub(super) fn lights_changed(&mut self) {
         if let Some(ongoing) = &mut self.ongoing {
-            ongoing.failures = 0;
-            ongoing.geometry_changed();
+            ongoing.schedule.lights_changed();
         }
     }
 
@@ -180,12 +141,12 @@ impl EnvMapPlacement {
             return false;
         };
         if ongoing.resources.take_lost() {
-            ongoing.is_pending = true;
+            ongoing.schedule.repeat();
         }
         let Some(selection) = ongoing.resources.take_selection() else {
             return false;
         };
-        ongoing.settle(&selection);
+        ongoing.schedule.settle(&selection);
         self.adopt(&selection, frame);
         true
     }
@@ -193,7 +154,8 @@ impl EnvMapPlacement {
     fn adopt(&mut self, selection: &Selection, frame: &UnitFrame) {
         // Where nothing is seen from anywhere, the first candidates are as good as any.
         if !selection.centers.is_empty() {
-            self.centers = Some(selection.centers.iter().map(|&c| frame.world_point(c)).collect());
+            let centers = selection.centers.iter().map(|&c| frame.world_point(c)).collect();
+            self.centers = Some(in_place(self.centers.as_deref().unwrap_or(&[]), centers));
             self.coverage = Some(selection.coverage);
         }
     }
@@ -207,9 +169,8 @@ impl EnvMapPlacement {
         views: &mut Vec<CaptureView>,
     ) -> Option<Work> {
         let ongoing = self.ongoing.as_mut()?;
-        let work = ongoing.next_work(settings.interval, has_photons);
-        ongoing.photons_in = ongoing.photons_in.map(|frames| frames.saturating_sub(1));
-        let work = work?;
+        let count = ongoing.resources.candidates().len();
+        let work = ongoing.schedule.next_work(count, settings.interval, has_photons)?;
         views.extend(ongoing.resources.views(work.candidates.clone()));
         Some(work)
     }
@@ -234,14 +195,16 @@ impl EnvMapPlacement {
             step: inputs.work.step,
             limit: context.limit,
             radius: context.frame.radius(),
-            tag: ongoing.tag,
+            tag: ongoing.schedule.tag(),
             provisional: is_provisional.then_some(inputs.env_maps),
             photons: inputs.photons.filter(|_| context.goes_by_photons()),
             settings: context.settings,
             timestamps: inputs.timestamps,
         };
         selector.record(encoder, &mut ongoing.resources, &selector_inputs);
-        ongoing.advance(inputs.work.step, context.goes_by_photons() && inputs.photons.is_none());
+        ongoing
+            .schedule
+            .advance(inputs.work.step, context.goes_by_photons() && inputs.photons.is_none());
     }
 
     /// Selects, by what photons of an earlier frame reach if there are any, and waits.
@@ -263,13 +226,15 @@ impl EnvMapPlacement {
             queue: context.queue,
             frame: context.frame,
             limit: context.limit,
-            tag: ongoing.tag,
+            tag: ongoing.schedule.tag(),
             photons,
             settings: context.settings,
         };
         let selection = selector.select_blocking(&mut ongoing.resources, &inputs, geometry)?;
-        ongoing.advance(SelectionStep::Select, context.goes_by_photons() && photons.is_none());
-        ongoing.settle(&selection);
+        ongoing
+            .schedule
+            .advance(SelectionStep::Select, context.goes_by_photons() && photons.is_none());
+        ongoing.schedule.settle(&selection);
         self.adopt(&selection, context.frame);
         Ok(())
     }
@@ -278,6 +243,23 @@ impl EnvMapPlacement {
     pub(super) fn memory_use(&self) -> u64 {
         self.ongoing.as_ref().map_or(0, |o| o.resources.memory_use())
     }
+}
+
+/// The new centres in an order in which those that stay keep their places, and with these their maps' contents.
+fn in_place(old: &[DVec3], new: Vec<DVec3>) -> Vec<DVec3> {
+    let mut placed = vec![None; new.len()];
+    let mut others = Vec::new();
+    for center in new {
+        match old.iter().position(|&o| o == center).and_then(|i| placed.get_mut(i)) {
+            Some(place @ None) => *place = Some(center),
+            _ => others.push(center),
+        }
+    }
+    let mut others = others.into_iter();
+    placed
+        .into_iter()
+        .filter_map(|place| place.or_else(|| others.next()))
+        .collect()
 }
 
 /// What recording one frame's share needs.
@@ -300,16 +282,7 @@ impl OngoingSelection {
             region: *context.region,
             frame: *context.frame,
             last_region: *context.region,
-            is_pending: true,
-            photon_rounds: 0,
-            photons_in: None,
-            failures: 0,
-            awaited: 0,
-            is_started: false,
-            rounds: 0,
-            part: 0,
-            tag: 1,
-            settles_from: 1,
+            schedule: SelectionSchedule::new(),
         };
         ongoing.spread_candidates(context)?;
         Ok(ongoing)
@@ -328,81 +301,23 @@ impl OngoingSelection {
     fn spread_candidates(&mut self, context: &SelectionContext<'_>) -> Result<(), Error> {
         self.resources.set_candidates(context.queue, &context.candidates())?;
         (self.region, self.frame) = (*context.region, *context.frame);
-        (self.is_pending, self.is_started, self.failures) = (true, false, 0);
+        self.schedule.restart();
         Ok(())
     }
+}
 
-    fn geometry_changed(&mut self) {
-        if !self.is_started {
-            self.is_pending = true;
-        } else if self.part == 0 {
-            // The first round drops no map.
-            (self.rounds, self.settles_from) = (MOST_ROUNDS, self.tag + 1);
-        } else {
-            // And part of this round was captured before the change.
-            (self.rounds, self.settles_from) = (MOST_ROUNDS + 1, self.tag + 2);
-        }
-    }
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-    fn next_work(&self, interval: u32, has_photons: bool) -> Option<Work> {
-        let count = self.resources.candidates().len();
-        if self.is_pending || (has_photons && self.photon_rounds > 0 && self.photons_in == Some(0)) {
-            return Some(Work {
-                candidates: 0..count,
-                step: SelectionStep::Select,
-            });
-        }
-        if self.rounds == 0 {
-            return None;
-        }
-        let border = |part: u32| count * part as usize / interval as usize;
-        let is_last = self.part + 1 >= interval;
-        Some(Work {
-            candidates: border(self.part)..border(self.part + 1),
-            step: match is_last {
-                false => SelectionStep::Capture,
-                true if self.rounds >= MOST_ROUNDS => SelectionStep::Maintain,
-                true => SelectionStep::Settle,
-            },
-        })
-    }
-
-    /// Notes that a step was recorded, and whether it lacked photons to go by.
-    fn advance(&mut self, step: SelectionStep, lacked_photons: bool) {
-        match step {
-            SelectionStep::Capture => {
-                self.part += 1;
-                return;
-            }
-            SelectionStep::Select => {
-                (self.is_pending, self.is_started, self.awaited) = (false, true, self.tag);
-                if lacked_photons {
-                    (self.photon_rounds, self.photons_in) = (PHOTON_ROUNDS, None);
-                } else {
-                    (self.photon_rounds, self.photons_in) = (self.photon_rounds.saturating_sub(1), None);
-                }
-                (self.rounds, self.settles_from) = (MOST_ROUNDS, self.tag);
-            }
-            SelectionStep::Maintain | SelectionStep::Settle => self.rounds = self.rounds.saturating_sub(1),
-        }
-        self.part = 0;
-        self.tag += 1;
-    }
-
-    /// Comes to rest once a step has found nothing to change in the geometry as it is now.
-    fn settle(&mut self, selection: &Selection) {
-        if selection.tag < self.awaited {
-            return;
-        }
-        if selection.centers.is_empty() && self.failures < MOST_FAILURES {
-            // No photon arrived anywhere, as when the frame that traced them was never submitted.
-            self.failures += 1;
-            (self.photon_rounds, self.photons_in) = (self.photon_rounds + 1, Some(1));
-            return;
-        }
-        self.photons_in = self.photons_in.or(Some(1));
-        if selection.is_stable && selection.tag >= self.settles_from {
-            (self.rounds, self.part) = (0, 0);
-        }
+    #[test]
+    fn maps_that_stay_keep_their_places() {
+        let [a, b, c, d, e] = [1.0, 2.0, 3.0, 4.0, 5.0].map(DVec3::splat);
+        assert_eq!(in_place(&[], vec![a, b]), [a, b]);
+        // One is dropped: the last takes its place.
+        assert_eq!(in_place(&[a, b, c, d], vec![a, c, d]), [a, d, c]);
+        // One is exchanged, one added.
+        assert_eq!(in_place(&[a, b, c], vec![a, c, d, e]), [a, d, c, e]);
+        assert_eq!(in_place(&[a, b], vec![]), []);
     }
 }

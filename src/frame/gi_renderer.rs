@@ -5,9 +5,10 @@
 //! for, submitted or, once settled, allocated on the way. One small result comes back by itself: where environment maps
 //! should stand.
 
-use super::env_map_placement::{EnvMapPlacement, PHOTON_ROUNDS, PlacementInputs, SelectionContext, Work};
+use super::env_map_placement::{EnvMapPlacement, PlacementInputs, SelectionContext};
 use super::indirect_scene::{IndirectScene, PhotonInputs, PhotonPasses};
 use super::recapture::Recapture;
+use super::selection_schedule::{PHOTON_ROUNDS, Work};
 use super::{Plan, Settings, Stage, Upsampling};
 use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, CoverageMeasure, DirectLight, DirectLightInputs,

@@ -6,6 +6,7 @@ mod gi_renderer;
 mod indirect_scene;
 mod plan;
 mod recapture;
+mod selection_schedule;
 mod settings;
 
 pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};

@@ -26,7 +26,7 @@ use std::ops::Range;
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
-    /// Twin of `Params` in `shaders/pass/env_map_selector/select_maps.wgsl`.
+    /// Twin of `Params` in `shaders/pass/env_map_selector/params.wgsl`.
     #[derive(Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
     pub(crate) struct Params {
@@ -40,6 +40,7 @@ pub(crate) mod gpu {
         pub(crate) coverage_target: f32,
         pub(crate) sample_count: u32,
         pub(crate) least_gain: f32,
+        pub(crate) slot_count: u32,
     }
 
     /// Twin of `SurfaceSample` in `shaders/common/surface_sample.wgsl`.
@@ -75,7 +76,7 @@ pub(crate) mod gpu {
         pub(crate) is_stable: u32,
         pub(crate) swaps: u32,
         pub(crate) coverage: f32,
-        pub(crate) pad: u32,
+        pub(crate) total: f32,
         pub(crate) chosen: [u32; 32],
     }
 }
@@ -95,10 +96,17 @@ pub(crate) const SLOTS: [Slot; 7] = [
 pub(crate) const SWITCH_SLOTS: [Slot; 1] = [Slot::StorageMut];
 
 /// Bindings of `shaders/pass/env_map_selector/pick_samples.wgsl`, in order.
-pub(crate) const SAMPLE_SLOTS: [Slot; 2] = [Slot::Storage, Slot::StorageMut];
+pub(crate) const SAMPLE_SLOTS: [Slot; 6] = [
+    Slot::Uniform,
+    Slot::UintTexture,
+    Slot::Storage,
+    Slot::Storage,
+    Slot::Storage,
+    Slot::StorageMut,
+];
 
 /// Samples of the surfaces that light reaches: four times as many found no better places (`docs/tracing.md`).
-const SAMPLES: u32 = 4096;
+const SAMPLES: u32 = 8192;
 
 /// Texels along a face of a candidate's map (Yao et al. 2010, section 4). Twin of `CANDIDATE_SIZE`.
 pub(crate) const CANDIDATE_SIZE: u32 = 32;
@@ -202,10 +210,10 @@ pub struct Selection {
     pub tag: u32,
 }
 
-/// Samples that an exchange of maps has to gain; and while geometry moves, where every exchange is seen as a jump of what
-/// maps do not see well.
-const LEAST_GAIN: f32 = 0.5;
-const LEAST_GAIN_IN_MOTION: f32 = 8.0;
+/// Share of all there is to be seen that a map, or the exchange of one, has to gain; and while geometry moves, where every
+/// exchange is seen as a jump of what maps do not see well.
+const LEAST_GAIN: f32 = 1.2e-4;
+const LEAST_GAIN_IN_MOTION: f32 = 2e-3;
 
 /// What to do with the candidates once they are captured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -462,6 +470,7 @@ impl EnvMapSelector {
                 },
             coverage_target: inputs.settings.coverage_target,
             sample_count: inputs.photons.map_or(0, |_| SAMPLES),
+            slot_count: inputs.photons.map_or(0, Photons::slots),
             least_gain: match inputs.step {
                 SelectionStep::Maintain => LEAST_GAIN_IN_MOTION,
                 _ => LEAST_GAIN,
@@ -486,33 +495,35 @@ impl EnvMapSelector {
             resources.groups.get(&self.device, label, &self.switch_layout, &bound)
         });
         let sample_group = inputs.photons.map(|photons| {
-            let bound = [photons.buffer().into(), (&resources.samples).into()];
+            let bound = [
+                (&resources.params).into(),
+                (&resources.atlas).into(),
+                (&resources.centers).into(),
+                (&resources.sights).into(),
+                photons.buffer().into(),
+                (&resources.samples).into(),
+            ];
             resources.groups.get(&self.device, label, &self.sample_layout, &bound)
         });
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
-        if let Some(group) = &sample_group {
-            pass.set_bind_group(0, group, &[]);
-            pass.set_pipeline(&self.steps.pick_samples);
-            pass.dispatch_workgroups(SAMPLES.div_ceil(64), 1, 1);
-        }
         pass.set_bind_group(0, &group, &[]);
-        let by_samples = sample_group.is_some();
-        let mut run = |pipeline: &wgpu::ComputePipeline, groups: u32| {
-            pass.set_pipeline(pipeline);
-            pass.dispatch_workgroups(groups, 1, 1);
-        };
         let steps = &self.steps;
         let is_anew = inputs.step == SelectionStep::Select;
         if is_anew {
-            run(&steps.start_anew, 1);
+            run(&mut pass, &steps.start_anew, 1);
         }
-        run(&steps.inspect_candidates, count);
-        run(&steps.admit_candidates, 1);
-        if by_samples {
-            run(&steps.see_samples, count);
+        run(&mut pass, &steps.inspect_candidates, count);
+        run(&mut pass, &steps.admit_candidates, 1);
+        let by_samples = sample_group.is_some();
+        if let Some(sample_group) = &sample_group {
+            pass.set_bind_group(0, sample_group, &[]);
+            run(&mut pass, &steps.pick_samples, SAMPLES);
+            pass.set_bind_group(0, &group, &[]);
+            run(&mut pass, &steps.see_samples, count);
         } else if !is_anew {
-            run(&steps.mark_all, count);
+            run(&mut pass, &steps.mark_all, count);
         }
+        let mut run = |pipeline: &wgpu::ComputePipeline, groups: u32| run(&mut pass, pipeline, groups);
         // In a maintenance these fill places that became invalid, and add maps where the scene has grown.
         for _ in 0..limit {
             run(&steps.sum_unseen, count);
@@ -524,7 +535,19 @@ impl EnvMapSelector {
         run(&steps.end_steps, 1);
         run(&steps.sum_unseen, count);
         run(&steps.begin_swaps, 1);
-        for _ in 0..if is_anew { MOST_SWAPS } else { 1 } {
+        let most_swaps = match inputs.step {
+            SelectionStep::Capture | SelectionStep::Maintain => 1,
+            SelectionStep::Select => MOST_SWAPS,
+            // By area it costs as much as the greedy step of a map.
+            SelectionStep::Settle => {
+                if by_samples {
+                    MOST_SWAPS
+                } else {
+                    1
+                }
+            }
+        };
+        for _ in 0..most_swaps {
             if by_samples {
                 run(&steps.try_exchanges, count);
                 run(&steps.exchange_map, 1);
@@ -540,10 +563,7 @@ impl EnvMapSelector {
         run(&steps.sum_unseen, count);
         let most_dropped = match inputs.step {
             SelectionStep::Capture | SelectionStep::Maintain => 0,
-            SelectionStep::Select | SelectionStep::Settle if by_samples => MOST_SWAPS,
-            // By area it would cost as much as all swaps, and maintenance follows.
-            SelectionStep::Select => 0,
-            SelectionStep::Settle => 1,
+            SelectionStep::Select | SelectionStep::Settle => MOST_SWAPS,
         };
         for _ in 0..most_dropped {
             run(&steps.try_without, 1);
@@ -551,6 +571,8 @@ impl EnvMapSelector {
             run(&steps.keep_if_needed, 1);
             run(&steps.sum_unseen, count);
         }
+        run(&steps.end_steps, 1);
+        run(&steps.sum_unseen, count);
         run(&steps.measure_coverage, 1);
         if let Some(group) = &switch_group {
             pass.set_bind_group(1, group, &[]);
@@ -783,6 +805,11 @@ impl EnvMapSelectorResources {
     pub fn memory_use(&self) -> u64 {
         self.bytes
     }
+}
+
+fn run(pass: &mut wgpu::ComputePass<'_>, pipeline: &wgpu::ComputePipeline, groups: u32) {
+    pass.set_pipeline(pipeline);
+    pass.dispatch_workgroups(groups, 1, 1);
 }
 
 /// Columns and rows of tiles, nearly a square, in texels.

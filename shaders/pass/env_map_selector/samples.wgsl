@@ -1,8 +1,19 @@
-// What candidates see of the surfaces that light reaches: samples of these are taken where photons arrived, so that the
+// What candidates see of samples of the surfaces that light reaches, and of those around (pick_samples.wgsl), so that the
 // outside of a building, which no light of its rooms reaches, does not count. One bit for each sample and candidate.
+
+// What a sample of the second half counts against one where light arrives: it decides among places that see the light
+// alike, and dark corners get their map if there is one to spare.
+const SAMPLES_AROUND: f32 = 0.125;
+// A second look at a sample counts as little as this against a first: it decides where nothing new is to be seen.
+const SAMPLES_SECOND_LOOK: f32 = 0.002;
 
 fn samples_words() -> u32 {
     return (params.sample_count + 31u) / 32u;
+}
+
+// What the samples of these bits of a word are worth.
+fn samples_weight(word: u32, bits: u32) -> f32 {
+    return select(1.0, SAMPLES_AROUND, 2u * word >= samples_words()) * f32(countOneBits(bits));
 }
 
 // The bits of a candidate: a workgroup for each.
@@ -20,7 +31,7 @@ fn see_samples(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_in
             }
         }
         seen_by[candidate * CANDIDATE_TEXELS + word] = bits;
-        seen += f32(countOneBits(bits));
+        seen += samples_weight(word, bits);
     }
     let total = sum_lanes(lane, vec2f(seen, 0.0)).x;
     if lane == 0u {
@@ -40,12 +51,9 @@ fn samples_seen(word: u32, maps: u32) -> vec2u {
     return seen;
 }
 
-// A second look at a sample counts as little as this against a first: it decides where nothing new is to be seen.
-const SAMPLES_SECOND_LOOK: f32 = 0.002;
-
 // What a candidate's view of a word is worth beside what other maps see.
-fn samples_worth(own: u32, others: vec2u) -> f32 {
-    return f32(countOneBits(own & ~others.x)) + SAMPLES_SECOND_LOOK * f32(countOneBits(own & others.x & ~others.y));
+fn samples_worth(word: u32, own: u32, others: vec2u) -> f32 {
+    return samples_weight(word, own & ~others.x) + SAMPLES_SECOND_LOOK * samples_weight(word, own & others.x & ~others.y);
 }
 
 // This lane's part of what a candidate's view is worth beside the selected maps, and beside the other selected maps.
@@ -54,7 +62,8 @@ fn samples_unseen(candidate: u32, lane: u32, others: u32) -> vec2f {
     for (var word = lane; word < samples_words(); word += LANES) {
         let own = seen_by[candidate * CANDIDATE_TEXELS + word];
         worth += vec2f(
-            samples_worth(own, samples_seen(word, selection.selected)), samples_worth(own, samples_seen(word, others)),
+            samples_worth(word, own, samples_seen(word, selection.selected)),
+            samples_worth(word, own, samples_seen(word, others)),
         );
     }
     return worth;
@@ -71,7 +80,7 @@ fn samples_uncovered(lane: u32) -> vec2f {
             }
         }
         counts += vec2f(
-            f32(countOneBits(reachable & ~samples_seen(word, selection.selected).x)), f32(countOneBits(reachable)),
+            samples_weight(word, reachable & ~samples_seen(word, selection.selected).x), samples_weight(word, reachable),
         );
     }
     return counts;
@@ -82,7 +91,7 @@ fn samples_gain(candidate: u32, bit: u32, lane: u32) -> f32 {
     let others = selection.selected & ~(1u << bit);
     var worth = 0.0;
     for (var word = lane; word < samples_words(); word += LANES) {
-        worth += samples_worth(seen_by[candidate * CANDIDATE_TEXELS + word], samples_seen(word, others));
+        worth += samples_worth(word, seen_by[candidate * CANDIDATE_TEXELS + word], samples_seen(word, others));
     }
     return sum_lanes(lane, vec2f(worth, 0.0)).x - sights[selection.chosen[bit]].own;
 }
@@ -120,7 +129,7 @@ fn exchange_map(@builtin(local_invocation_index) lane: u32) {
     }
     let winner = best_of_lanes(lane, own);
     if lane == 0u {
-        shared_bits = select(selection.selected, 0u, winner.x < params.least_gain || selection.is_done != 0u);
+        shared_bits = select(selection.selected, 0u, winner.x < params.least_gain * selection.total || selection.is_done != 0u);
     }
     let candidate = u32(winner.y);
     var best_gain = 0.0;

@@ -3,43 +3,6 @@
 //
 // What is seen is measured by area, texel by texel, or in samples of the surfaces that light reaches (samples.wgsl).
 
-struct Params {
-    candidate_count: u32,
-    // Tiles in a row of the atlas
-    columns: u32,
-    // Most maps to select
-    limit: u32,
-    // Handed back with the result
-    tag: u32,
-    back_face_limit: f32,
-    // Unit frame
-    clearance: f32,
-    // How far behind a texel's plane a point may lie and still be seen, unit frame
-    tolerance: f32,
-    coverage_target: f32,
-    // 0: by area
-    sample_count: u32,
-    // Exchanges that gain less, in samples, are not worth a map's moving
-    least_gain: f32,
-}
-
-// What one candidate sees.
-struct Sight {
-    surfaces: u32,
-    back_faces: u32,
-    // f32 bits of the nearest distance; all ones if there is none
-    nearest: u32,
-    is_valid: u32,
-    // A(v | nothing): area, or number of samples, seen
-    area: f32,
-    // Part of it that no selected map sees
-    unseen: f32,
-    // Part of it that no selected map but this one sees
-    own: f32,
-    // By samples: what the best exchange of a selected map for this candidate gains
-    exchange: f32,
-}
-
 struct Selection {
     tag: u32,
     // Bits of `chosen` in use
@@ -51,7 +14,8 @@ struct Selection {
     is_stable: u32,
     swaps: u32,
     coverage: f32,
-    pad: u32,
+    // All there is to be seen: area, or worth of samples
+    total: f32,
     // Candidate by bit
     chosen: array<u32, 32>,
 }
@@ -263,8 +227,8 @@ fn sum_unseen(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
     }
 }
 
-// Of what valid candidates see, the share that selected maps see.
-fn coverage(lane: u32) -> f32 {
+// Of what valid candidates see: the part that selected maps do not see, and all of it.
+fn uncovered(lane: u32) -> vec2f {
     var area = vec2f(0.0);
     if params.sample_count > 0u {
         area = samples_uncovered(lane);
@@ -272,8 +236,12 @@ fn coverage(lane: u32) -> f32 {
     for (var i = lane; i < params.candidate_count && params.sample_count == 0u; i += LANES) {
         area += select(vec2f(0.0), vec2f(sights[i].unseen, sights[i].area), sights[i].is_valid == 1u);
     }
-    let total = sum_lanes(lane, area);
-    return select(0.0, 1.0 - total.x / total.y, total.y > 0.0);
+    return sum_lanes(lane, area);
+}
+
+// Where there is nothing to be seen, all of it is.
+fn coverage(uncovered: vec2f) -> f32 {
+    return select(1.0, 1.0 - uncovered.x / uncovered.y, uncovered.y > 0.0);
 }
 
 // The unselected candidate that sees the most new, the first of equals; NONE if there is none left.
@@ -296,20 +264,28 @@ fn add(candidate: u32) {
     selection.newest = bit;
 }
 
-// Greedy: takes the best addition, unless there are enough maps or enough is seen.
+// Greedy: takes the best addition, unless there are enough maps, enough is seen, or it would add too little. With a
+// target of 1 nothing is too little.
 @compute @workgroup_size(256)
 fn add_map(@builtin(local_invocation_index) lane: u32) {
-    let covered = coverage(lane);
+    let left = uncovered(lane);
     let addition = best_addition(lane);
     if lane != 0u || selection.is_done != 0u {
         return;
     }
     let count = countOneBits(selection.selected);
-    let sees_nothing = params.sample_count > 0u && count == 0u && addition != NONE && sights[addition].unseen <= 0.0;
-    if count >= params.limit || addition == NONE || sees_nothing || (count > 0u && is_satisfied(covered)) {
+    if count >= params.limit || addition == NONE {
         selection.is_done = 1u;
-    } else {
+        return;
+    }
+    let gain = sights[addition].unseen;
+    let sees_nothing = params.sample_count > 0u && gain <= 0.0;
+    let is_worth_it = params.coverage_target >= 1.0 || gain >= params.least_gain * left.y;
+    let is_first = count == 0u && !sees_nothing;
+    if is_first || (is_worth_it && !is_satisfied(coverage(left))) {
         add(addition);
+    } else {
+        selection.is_done = 1u;
     }
 }
 
@@ -321,9 +297,10 @@ fn is_satisfied(covered: f32) -> bool {
 // After the greedy steps: swaps may follow, unless all that was asked for is seen.
 @compute @workgroup_size(256)
 fn begin_swaps(@builtin(local_invocation_index) lane: u32) {
-    let covered = coverage(lane);
+    let left = uncovered(lane);
     if lane == 0u {
-        selection.is_done = u32(is_satisfied(covered));
+        selection.total = left.y;
+        selection.is_done = u32(is_satisfied(coverage(left)));
         selection.is_stable = selection.is_done;
     }
 }
@@ -356,18 +333,22 @@ fn least_own(preferred: u32) -> u32 {
     return found;
 }
 
-// Second half: drops the map that sees the least that no other does. If it is the newest, the selection is stable.
+// Second half: drops the map that sees the least that no other does. If that gains too little, it drops the newest, and the
+// selection is stable.
 @compute @workgroup_size(1)
 fn drop_map() {
     if selection.is_done != 0u {
         return;
     }
-    let dropped = least_own(selection.newest);
-    selection.selected &= ~(1u << dropped);
-    if dropped == selection.newest {
+    let newest = selection.newest;
+    let least = least_own(newest);
+    let gain = sights[selection.chosen[newest]].own - sights[selection.chosen[least]].own;
+    if least == newest || gain < params.least_gain * selection.total {
+        selection.selected &= ~(1u << newest);
         selection.is_done = 1u;
         selection.is_stable = 1u;
     } else {
+        selection.selected &= ~(1u << least);
         selection.swaps += 1u;
     }
 }
@@ -381,32 +362,36 @@ fn end_steps() {
 // A scene that has become simpler may need a map less: tries without the one that sees the least.
 @compute @workgroup_size(256)
 fn try_without(@builtin(local_invocation_index) lane: u32) {
-    let covered = coverage(lane);
-    if lane == 0u {
-        selection.newest = NONE;
-        if is_satisfied(covered) && countOneBits(selection.selected) > 1u {
-            selection.newest = least_own(countTrailingZeros(selection.selected));
-            selection.selected &= ~(1u << selection.newest);
-        }
+    let covered = coverage(uncovered(lane));
+    if lane != 0u || selection.is_done != 0u {
+        return;
+    }
+    if is_satisfied(covered) && countOneBits(selection.selected) > 1u {
+        selection.newest = least_own(countTrailingZeros(selection.selected));
+        selection.selected &= ~(1u << selection.newest);
+    } else {
+        selection.is_done = 1u;
     }
 }
 
-// And takes it back where it was needed.
+// And takes it back where it was needed: then all are.
 @compute @workgroup_size(256)
 fn keep_if_needed(@builtin(local_invocation_index) lane: u32) {
-    let covered = coverage(lane);
-    if lane == 0u && selection.newest != NONE {
-        if is_satisfied(covered) {
-            selection.is_stable = 0u;
-        } else {
-            selection.selected |= 1u << selection.newest;
-        }
+    let covered = coverage(uncovered(lane));
+    if lane != 0u || selection.is_done != 0u {
+        return;
+    }
+    if is_satisfied(covered) {
+        selection.is_stable = 0u;
+    } else {
+        selection.selected |= 1u << selection.newest;
+        selection.is_done = 1u;
     }
 }
 
 @compute @workgroup_size(256)
 fn measure_coverage(@builtin(local_invocation_index) lane: u32) {
-    let covered = coverage(lane);
+    let covered = coverage(uncovered(lane));
     if lane == 0u {
         selection.coverage = covered;
     }
