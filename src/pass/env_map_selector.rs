@@ -2,7 +2,7 @@
 //!
 //! Inputs: [`Geometry`], candidates, and photons of an earlier frame if there are any. Output: a [`Selection`], a frame or
 //! two later. Each candidate is captured at 32² texels a face into one atlas. What it sees is counted in one of two ways: in
-//! samples of the surfaces where photons arrived, or by area (Yao et al. 2010, Eq. 1), texel by texel. Greedily the candidate
+//! samples of the surfaces where photons arrived and of what is seen from there, or by area (Yao et al. 2010, Eq. 1), texel by texel. Greedily the candidate
 //! that sees the most new is added, until there are enough maps or the coverage target is reached; then maps are swapped
 //! while that helps (section 4.1). Nothing leaves the GPU but the result, and nothing waits for it.
 //!
@@ -105,7 +105,7 @@ pub(crate) const SAMPLE_SLOTS: [Slot; 6] = [
     Slot::StorageMut,
 ];
 
-/// Samples of the surfaces that light reaches: four times as many found no better places (`docs/tracing.md`).
+/// Samples of surfaces, the first half where light arrives: four times as many found no better places (`docs/tracing.md`).
 const SAMPLES: u32 = 8192;
 
 /// Texels along a face of a candidate's map (Yao et al. 2010, section 4). Twin of `CANDIDATE_SIZE`.
@@ -135,7 +135,8 @@ const THINNEST: f32 = 0.1;
 /// What the sight of a candidate is measured in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum CoverageMeasure {
-    /// Places where photons of an earlier frame arrived: what light reaches. Until there are any, area.
+    /// Places where photons of an earlier frame arrived, and, for a sixteenth, what is seen from where these are seen: what
+    /// light reaches, or might. Until there are any, area.
     #[default]
     Photons,
     /// Area (Yao et al. 2010, Eq. 1): all that can be seen from any candidate, the outside of a building too.
@@ -154,7 +155,7 @@ pub struct EnvMapSelectorSettings {
     /// What is to be covered. [`EnvMapSelector`] itself goes by the photons that it is given, or not given.
     pub measure: CoverageMeasure,
     /// Share of what all candidates see at which no further map is added. Higher selects more maps, which cost
-    /// captures and find more of what rays hit; 1: as many as there may be.
+    /// captures and find more of what rays hit. Below 1 a map must add at least 0.012 %; 1: as many as there may be.
     pub coverage_target: f32,
     /// Frames over which all candidates are captured anew while the scene changes; each such round ends with one
     /// maintenance step. More frames are cheaper each and follow changes later.
@@ -187,7 +188,8 @@ pub struct Sight {
     pub nearest: f32,
     /// Whether it may be selected.
     pub is_valid: bool,
-    /// A(v | ∅): area of the surfaces seen, unit-frame lengths squared; or the number of samples seen.
+    /// A(v | ∅): area of the surfaces seen, unit-frame lengths squared; or the number of samples seen, those around for a
+    /// sixteenth.
     pub area: f32,
     /// A(v | C): the part that no selected map sees.
     pub unseen: f32,

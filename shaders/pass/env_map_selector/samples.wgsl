@@ -2,8 +2,8 @@
 // outside of a building, which no light of its rooms reaches, does not count. One bit for each sample and candidate.
 
 // What a sample of the second half counts against one where light arrives: it decides among places that see the light
-// alike, and dark corners get their map if there is one to spare.
-const SAMPLES_AROUND: f32 = 0.125;
+// alike, and what lies in the dark gets its map if there is one to spare.
+const SAMPLES_AROUND: f32 = 0.0625;
 // A second look at a sample counts as little as this against a first: it decides where nothing new is to be seen.
 const SAMPLES_SECOND_LOOK: f32 = 0.002;
 
