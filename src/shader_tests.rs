@@ -4,14 +4,15 @@
 use crate::gpu::Slot;
 use crate::pass::photon_splatter::{raster, sort, tiled};
 use crate::pass::{
-    accumulator, composite, depth_hierarchy_build, direct_light, env_map_selector, image_space_tracer,
-    nearest_occluder, photon_emitter, photon_splatter, photon_walk, soft_shadow, tone_map, trace_statistics, upsampler,
+    accumulator, composite, depth_hierarchy_build, direct_light, emission_importance, env_map_selector,
+    image_space_tracer, nearest_occluder, photon_emitter, photon_splatter, photon_walk, soft_shadow, tone_map,
+    trace_statistics, upsampler,
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
 use crate::resource::{
-    Photon, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, g_buffer, lights, lost_rays, marked_pixels,
-    mesh_geometry, view,
+    Photon, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, emission_cells, g_buffer, lights, lost_rays,
+    marked_pixels, mesh_geometry, view,
 };
 use crate::wgsl;
 #[cfg(feature = "bvh")]
@@ -328,6 +329,10 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::ENV_MAP_SELECTOR, "Selection", env_map_selector::gpu::SelectionRecord {
             tag, selected, newest, is_done, is_stable, swaps, coverage, total, chosen,
         }),
+        twin!(wgsl::EMISSION_IMPORTANCE_COUNT, "Params", emission_importance::gpu::Params {
+            path_count, slot_count, light_count, row, share, kept,
+        }),
+        twin!(wgsl::PHOTON_EMITTER, "EmissionTable", emission_cells::gpu::EmissionTable { columns, rows }),
         twin!(wgsl::TRACE_STATISTICS, "Params", trace_statistics::gpu::Params { photon_count }),
         twin!(wgsl::TRACE_STATISTICS, "Sums", trace_statistics::gpu::Sums { stored, tentative, absorbed, escaped, lost }),
     ]
@@ -424,7 +429,7 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
     match module {
         "DepthHierarchyBuild measure" | "DepthHierarchyBuild join" => vec![&depth_hierarchy_build::SLOTS],
         "MeshGeometry" => vec![&mesh_geometry::SCENE_SLOTS, &mesh_geometry::MATERIAL_SLOTS],
-        "PhotonEmitter" => vec![&photon_emitter::SLOTS],
+        "PhotonEmitter" => vec![&photon_emitter::SLOTS, &photon_emitter::CELL_SLOTS],
         "ImageSpaceTracer" => vec![&photon_walk::SLOTS, &image_space_tracer::SLOTS],
         "ImageSpaceTracer rays" => vec![&image_space_tracer::RAY_SLOTS, &image_space_tracer::SLOTS],
         "ImageSpaceTracer list" => vec![&image_space_tracer::LIST_SLOTS],
@@ -432,6 +437,8 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "BvhTracer" => vec![&photon_walk::SLOTS, &bvh_geometry::BVH_SLOTS, &bvh_tracer::LOST_SLOTS],
         #[cfg(feature = "bvh")]
         "BvhTracer rays" => vec![&bvh_tracer::RAY_SLOTS, &bvh_geometry::BVH_SLOTS],
+        "EmissionImportance count" => vec![&emission_importance::COUNT_SLOTS],
+        "EmissionImportance update" => vec![&emission_importance::UPDATE_SLOTS],
         "PhotonSplatter receivers" => vec![&photon_splatter::RECEIVER_SLOTS],
         "PhotonSplatter tiled" => vec![&tiled::TILED_SLOTS],
         "PhotonSplatter sort" => vec![&sort::SORT_SLOTS],

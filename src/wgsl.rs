@@ -30,6 +30,7 @@ pub(crate) const MESH_GEOMETRY: &str = compose![
 
 pub(crate) const PHOTON_EMITTER: &str = compose![
     "pass/photon_emitter.wgsl",
+    "common/emission_cells.wgsl",
     "common/light.wgsl",
     "common/photon.wgsl",
     "common/surface_texel.wgsl",
@@ -40,6 +41,20 @@ pub(crate) const PHOTON_EMITTER: &str = compose![
     "common/random.wgsl",
     "common/halton.wgsl",
     "common/hash.wgsl",
+];
+
+pub(crate) const EMISSION_IMPORTANCE_COUNT: &str = compose![
+    "pass/emission_importance/count_visible.wgsl",
+    "pass/emission_importance/params.wgsl",
+    "common/photon.wgsl",
+    "common/g_buffer.wgsl",
+    "common/octahedral.wgsl",
+];
+
+pub(crate) const EMISSION_IMPORTANCE_UPDATE: &str = compose![
+    "pass/emission_importance/update_tables.wgsl",
+    "pass/emission_importance/params.wgsl",
+    "common/emission_cells.wgsl",
 ];
 
 pub(crate) const DEPTH_HIERARCHY_BUILD_MEASURE: &str = compose![
@@ -385,6 +400,8 @@ pub(crate) const BVH_FUNCTIONS: &str = compose![
 pub const MODULES: &[(&str, &str)] = &[
     ("MeshGeometry", MESH_GEOMETRY),
     ("PhotonEmitter", PHOTON_EMITTER),
+    ("EmissionImportance count", EMISSION_IMPORTANCE_COUNT),
+    ("EmissionImportance update", EMISSION_IMPORTANCE_UPDATE),
     ("DepthHierarchyBuild measure", DEPTH_HIERARCHY_BUILD_MEASURE),
     ("DepthHierarchyBuild join", DEPTH_HIERARCHY_BUILD_JOIN),
     ("ImageSpaceTracer", IMAGE_SPACE_TRACER),

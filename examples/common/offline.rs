@@ -19,6 +19,9 @@ pub(crate) enum Component {
     Indirect,
 }
 
+/// Frames before the first that is shown, where frames depend on those before.
+const WARM_UP: u32 = 8;
+
 /// A scene on the GPU, ready to render frames of one camera.
 pub(crate) struct Offline<'a> {
     gpu: &'a Gpu,
@@ -65,7 +68,7 @@ impl<'a> Offline<'a> {
         } else {
             None
         };
-        Ok(Self {
+        let mut offline = Self {
             gpu,
             view: renderer.new_view(size)?,
             renderer,
@@ -77,7 +80,14 @@ impl<'a> Offline<'a> {
             camera,
             size,
             composite,
-        })
+        };
+        // Where photons start depends on what was seen of those before: a frame in motion has others before it.
+        if settings.emission_importance > 0.0 && offline.accumulator.is_none() {
+            for _ in 0..WARM_UP {
+                offline.render_frame(None)?;
+            }
+        }
+        Ok(offline)
     }
 
     /// Renders the next frame and waits for it: as of a scene in motion, unless frames are accumulated.

@@ -7,6 +7,11 @@ const PHOTON_LOST: u32 = 3u;
 const PHOTON_STATE_MASK: u32 = 3u;
 const PHOTON_FIRST_HIT: u32 = 256u;
 const PHOTON_TENTATIVE: u32 = 512u;
+// What a path keeps from its emission: bits 16 to 23 the cell that it started in, bits 24 to 31 how much more densely photons
+// start there than if they were spread evenly, 0 if they are.
+const PHOTON_EMISSION: u32 = 0xffff0000u;
+const PHOTON_BOOST_STEPS: f32 = 16.0;
+const PHOTON_BOOST_ONE: f32 = 128.0;
 
 struct Photon {
     position: vec3f,
@@ -17,6 +22,19 @@ struct Photon {
     direction: u32,
     reflectance: u32,
     light: u32,
+}
+
+fn photon_emission(cell: u32, boost: f32) -> u32 {
+    return (cell << 16u) | (u32(clamp(PHOTON_BOOST_ONE + round(PHOTON_BOOST_STEPS * log2(boost)), 1.0, 255.0)) << 24u);
+}
+
+fn photon_cell(state: u32) -> u32 {
+    return (state >> 16u) & 255u;
+}
+
+fn photon_boost(state: u32) -> f32 {
+    let steps = f32(state >> 24u) - PHOTON_BOOST_ONE;
+    return select(exp2(steps / PHOTON_BOOST_STEPS), 1.0, (state >> 24u) == 0u);
 }
 
 // A hop that met no surface.

@@ -12,6 +12,7 @@ struct Params {
 @group(0) @binding(1) var<storage, read> lights: array<Light>;
 @group(0) @binding(2) var shadow_maps: texture_2d_array<u32>;
 @group(0) @binding(3) var<storage, read_write> photons: array<Photon>;
+@group(1) @binding(0) var<storage, read> emission_tables: array<EmissionTable>;
 
 struct Emission {
     ray: LightRay,
@@ -19,8 +20,7 @@ struct Emission {
     pdf: f32,
 }
 
-fn emit(light: Light, sequence_index: u32) -> Emission {
-    let u = random_pair(sequence_index, 0u);
+fn emit(light: Light, u: vec2f) -> Emission {
     switch light.kind {
         case LIGHT_DIRECTIONAL: {
             let offset = light.disc_radius * sampling_disc(u);
@@ -47,24 +47,40 @@ fn light_of(photon: u32) -> u32 {
     return index;
 }
 
+// Evenly spread.
 @compute @workgroup_size(64)
 fn emit_photons(@builtin(global_invocation_id) id: vec3u) {
     let index = id.y * params.row + id.x;
-    if id.x >= params.row || index >= params.photon_count {
-        return;
+    if id.x < params.row && index < params.photon_count {
+        emit_photon(index, EmissionStart(random_pair(params.sample_offset + index, 0u), 0u, 1.0), 0u);
     }
+}
+
+// As the tables say.
+@compute @workgroup_size(64)
+fn emit_photons_by_cells(@builtin(global_invocation_id) id: vec3u) {
+    let index = id.y * params.row + id.x;
+    if id.x < params.row && index < params.photon_count {
+        let start = emission_start(light_of(index), random_pair(params.sample_offset + index, 0u));
+        emit_photon(index, start, photon_emission(start.cell, start.boost));
+    }
+}
+
+// `kept`: bits of the state that the path carries on.
+fn emit_photon(index: u32, start: EmissionStart, kept: u32) {
     let light_index = light_of(index);
     let light = lights[light_index];
     if index < light.first_photon || index >= light.first_photon + light.photon_count {
         photons[index] = photon_gone(PHOTON_EMPTY, vec3f(0.0), vec3f(0.0, 0.0, 1.0), 0u);
         return;
     }
-    let emission = emit(light, params.sample_offset + index);
+    let emission = emit(light, start.u);
     let ray = emission.ray;
+    let flux = light.photon_flux / start.boost;
     let at = cube_face_texel(ray.uv, params.shadow_map_size);
     let texel = surface_texel_unpack(textureLoad(shadow_maps, at, ray.layer, 0));
     if texel.distance <= 0.0 {
-        photons[index] = photon_gone(PHOTON_ESCAPED, light.photon_flux, ray.direction, light_index);
+        photons[index] = photon_gone(PHOTON_ESCAPED | kept, flux, ray.direction, light_index);
         return;
     }
     let distance = light_texel_distance(ray, light_texel_ray(light, ray, at, params.shadow_map_size), texel);
@@ -72,9 +88,9 @@ fn emit_photons(@builtin(global_invocation_id) id: vec3u) {
     let spread = select(1.0 / (distance * distance), 1.0, light.kind == LIGHT_DIRECTIONAL);
     photons[index] = Photon(
         ray.origin + distance * ray.direction,
-        PHOTON_STORED | PHOTON_FIRST_HIT,
-        light.photon_flux,
-        emission.pdf * cosine * spread,
+        PHOTON_STORED | PHOTON_FIRST_HIT | kept,
+        flux,
+        start.boost * emission.pdf * cosine * spread,
         octahedral_pack(texel.normal),
         octahedral_pack(ray.direction),
         reflectance_pack(texel.reflectance),

@@ -5,6 +5,7 @@
 //! for, submitted or, once settled, allocated on the way. One small result comes back by itself: where environment maps
 //! should stand.
 
+use super::emission_schedule::EmissionSchedule;
 use super::env_map_placement::{EnvMapPlacement, PlacementInputs, SelectionContext};
 use super::indirect_scene::{IndirectScene, PhotonInputs, PhotonPasses};
 use super::recapture::Recapture;
@@ -12,11 +13,11 @@ use super::selection_schedule::{PHOTON_ROUNDS, Work};
 use super::{Plan, Settings, Stage, Upsampling};
 use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, CoverageMeasure, DirectLight, DirectLightInputs,
-    DirectLightResources, EnvMapSelector, GBufferCapture, GBufferCaptureInputs, MarkedSplatInputs, NearestOccluder,
-    NearestOccluderInputs, NearestOccluderResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources,
-    PhotonSplatterSettings, ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources, SoftShadow,
-    SoftShadowInputs, SoftShadowResources, SplatShape, Upsampler, UpsamplerInputs, UpsamplerResources,
-    progressive_scale,
+    DirectLightResources, EmissionImportanceInputs, EmissionImportanceResources, EnvMapSelector, GBufferCapture,
+    GBufferCaptureInputs, MarkedSplatInputs, NearestOccluder, NearestOccluderInputs, NearestOccluderResources,
+    PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings, ShadowMapCapture,
+    ShadowMapCaptureInputs, ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources, SplatShape,
+    Upsampler, UpsamplerInputs, UpsamplerResources, progressive_scale,
 };
 #[cfg(feature = "bvh")]
 use crate::resource::BvhGeometry;
@@ -56,6 +57,7 @@ pub struct GiRenderer {
     photons_frame: Option<UnitFrame>,
     /// Of the photons.
     sample_offset: u32,
+    emission: EmissionSchedule,
     /// This frame's share of the selection, and its views.
     selection: Option<(Work, std::ops::Range<usize>)>,
 }
@@ -115,6 +117,8 @@ pub struct ViewResources {
 struct IndirectView {
     splatter: PhotonSplatterResources,
     estimated: Irradiance,
+    /// If photons start where they count.
+    importance: Option<EmissionImportanceResources>,
     /// From coarse to fine, while fewer pixels are estimated than seen.
     levels: Vec<UpsampledLevel>,
 }
@@ -215,6 +219,7 @@ impl GiRenderer {
             env_map_layers: Vec::new(),
             photons_frame: None,
             sample_offset: 0,
+            emission: EmissionSchedule::default(),
             selection: None,
         })
     }
@@ -240,7 +245,7 @@ impl GiRenderer {
             None => UnitFrame::new(&summary.bounds, summary.total_flux)?,
         };
         let plan = Plan::for_scene(summary, &self.settings);
-        self.allocate(&plan, lights)?;
+        self.allocate(queue, &plan, lights)?;
         let reach = |lights: &[Light]| {
             lights
                 .iter()
@@ -273,7 +278,7 @@ impl GiRenderer {
         Ok(frame)
     }
 
-    fn allocate(&mut self, plan: &Plan, lights: &[Light]) -> Result<(), Error> {
+    fn allocate(&mut self, queue: &wgpu::Queue, plan: &Plan, lights: &[Light]) -> Result<(), Error> {
         let (device, settings) = (&self.device, &self.settings);
         if !plan.is_on(Stage::DirectLight) {
             self.direct = None;
@@ -309,7 +314,7 @@ impl GiRenderer {
             self.generation = next_generation();
             self.photons_frame = None;
             self.recapture.forget();
-            self.indirect = Some(IndirectScene::new(device, settings)?);
+            self.indirect = Some(IndirectScene::new(device, queue, settings)?);
         }
         Ok(())
     }
@@ -480,6 +485,7 @@ impl GiRenderer {
             .plan_frame(&self.settings.selector, has_photons, &mut self.views);
         self.selection = work.map(|w| (w, selection_from..self.views.len()));
         number(&mut self.views);
+        self.emission.follow(self.revision, cameras);
         for (camera, view) in cameras.iter_mut().zip(&self.views) {
             camera.capture = *view;
         }
@@ -514,6 +520,7 @@ impl GiRenderer {
                 shadow_maps: &direct.shadow_maps,
                 views: &self.views[self.env_map_views.clone()],
                 layers: &self.env_map_layers,
+                updates_emission: self.emission.take_update(),
             };
             indirect.record(encoder, &self.passes.photons, &photon_inputs)?;
             self.recapture.recorded();
@@ -682,6 +689,23 @@ impl GiRenderer {
                 .photon_splatter
                 .record(encoder, &mut own.splatter, &splatter_inputs);
             self.upsample(encoder, &resources.g_buffer, own, inputs);
+            if let (Some(pass), Some(cells), Some(importance), Some(direct)) = (
+                &self.passes.photons.emission_importance,
+                scene.emission_cells(),
+                &mut own.importance,
+                &self.direct,
+            ) && self.emission.counts()
+            {
+                let importance_inputs = EmissionImportanceInputs {
+                    queue: inputs.queue,
+                    photons: &scene.photons,
+                    light_count: direct.lights.count(),
+                    g_buffer: &resources.g_buffer,
+                    cells,
+                    timestamps: inputs.timestamps,
+                };
+                pass.record(encoder, importance, &importance_inputs);
+            }
         }
         let composite_inputs = CompositeInputs {
             queue: inputs.queue,
@@ -881,9 +905,11 @@ impl IndirectView {
                 levels.push(UpsampledLevel::new(device, subsampling, size, is_marked)?);
             }
         }
+        let importance = (settings.emission_importance > 0.0).then(|| EmissionImportanceResources::new(device));
         Ok(Self {
             splatter,
             estimated,
+            importance: importance.transpose()?,
             levels,
         })
     }
@@ -898,6 +924,9 @@ impl IndirectView {
             ("indirect_irradiance", self.estimated.memory_use()),
             ("splatter", self.splatter.memory_use()),
         ];
+        if let Some(importance) = &self.importance {
+            list.push(("emission_cells", importance.memory_use()));
+        }
         if !self.levels.is_empty() {
             let levels = self.levels.iter().map(UpsampledLevel::memory_use);
             list.push(("upsampled_irradiance", levels.sum()));

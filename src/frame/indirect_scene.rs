@@ -5,11 +5,12 @@ use crate::Error;
 #[cfg(feature = "bvh")]
 use crate::pass::{BvhTracer, BvhTracerInputs, BvhTracerResources};
 use crate::pass::{
-    DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EnvMapCapture, EnvMapCaptureInputs,
-    EnvMapCaptureResources, ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitter,
-    PhotonEmitterInputs, PhotonEmitterResources, SharedHop,
+    DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EmissionImportance,
+    EmissionImportanceResources, EmissionUpdateInputs, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources,
+    ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitter, PhotonEmitterInputs,
+    PhotonEmitterResources, SharedHop,
 };
-use crate::resource::{CaptureView, DepthHierarchy, EnvMaps, Lights, LostRays, Photons, ShadowMaps};
+use crate::resource::{CaptureView, DepthHierarchy, EmissionCells, EnvMaps, Lights, LostRays, Photons, ShadowMaps};
 
 /// From the lights to the last surface.
 #[derive(Debug)]
@@ -17,6 +18,8 @@ pub(super) struct PhotonPasses {
     env_map_capture: EnvMapCapture,
     /// If the method needs it.
     depth_hierarchy_build: Option<DepthHierarchyBuild>,
+    /// If the settings use it.
+    pub(super) emission_importance: Option<EmissionImportance>,
     photon_emitter: PhotonEmitter,
     /// Those that the settings use.
     image_space_tracer: Option<ImageSpaceTracer>,
@@ -28,6 +31,8 @@ pub(super) struct PhotonPasses {
 #[derive(Debug)]
 pub(super) struct IndirectScene {
     pub(super) photons: Photons,
+    /// If photons start where they count.
+    emission: Option<(EmissionCells, EmissionImportanceResources)>,
     emitter: PhotonEmitterResources,
     image_space: Option<ImageSpaceScene>,
     #[cfg(feature = "bvh")]
@@ -57,6 +62,8 @@ pub(super) struct PhotonInputs<'a> {
     pub(super) views: &'a [CaptureView],
     /// The layers that these are of.
     pub(super) layers: &'a [u32],
+    /// Whether it is time to look where photons are seen.
+    pub(super) updates_emission: bool,
 }
 
 impl PhotonPasses {
@@ -65,6 +72,7 @@ impl PhotonPasses {
         Self {
             env_map_capture: EnvMapCapture::new(),
             depth_hierarchy_build: settings.needs_hierarchy().then(|| DepthHierarchyBuild::new(device)),
+            emission_importance: (settings.emission_importance > 0.0).then(|| EmissionImportance::new(device)),
             photon_emitter: PhotonEmitter::new(device),
             image_space_tracer: kind.uses_env_maps().then(|| ImageSpaceTracer::new(device, method)),
             #[cfg(feature = "bvh")]
@@ -74,7 +82,7 @@ impl PhotonPasses {
 }
 
 impl IndirectScene {
-    pub(super) fn new(device: &wgpu::Device, settings: &Settings) -> Result<Self, Error> {
+    pub(super) fn new(device: &wgpu::Device, queue: &wgpu::Queue, settings: &Settings) -> Result<Self, Error> {
         let kind = settings.tracer_kind;
         let is_shared = kind == TracerKind::Hybrid;
         let shared_hops = if is_shared { settings.bounces } else { 0 };
@@ -98,7 +106,12 @@ impl IndirectScene {
                 tracer: ImageSpaceTracerResources::for_shared_hops(device, shared_hops)?,
             })
         };
+        let emission = || {
+            let cells = EmissionCells::new(device, queue)?;
+            Ok((cells, EmissionImportanceResources::new(device)?))
+        };
         Ok(Self {
+            emission: (settings.emission_importance > 0.0).then(emission).transpose()?,
             emitter: PhotonEmitterResources::new(device)?,
             image_space: kind.uses_env_maps().then(image_space).transpose()?,
             #[cfg(feature = "bvh")]
@@ -119,6 +132,10 @@ impl IndirectScene {
 
     pub(super) fn env_maps(&self) -> Option<&EnvMaps> {
         self.image_space.as_ref().map(|i| &i.env_maps)
+    }
+
+    pub(super) fn emission_cells(&self) -> Option<&EmissionCells> {
+        self.emission.as_ref().map(|e| &e.0)
     }
 
     pub(super) fn depth_hierarchy(&self) -> Option<&DepthHierarchy> {
@@ -161,11 +178,24 @@ impl IndirectScene {
                 build.record(encoder, own, &build_inputs);
             }
         }
+        if let (Some(pass), Some((cells, own))) = (&passes.emission_importance, &mut self.emission)
+            && inputs.updates_emission
+        {
+            let update_inputs = EmissionUpdateInputs {
+                queue: scene.queue,
+                light_count: inputs.lights.count(),
+                cells,
+                share: inputs.settings.emission_importance,
+                timestamps: scene.timestamps,
+            };
+            pass.record_update(encoder, own, &update_inputs);
+        }
         let emitter_inputs = PhotonEmitterInputs {
             queue: scene.queue,
             lights: inputs.lights,
             shadow_maps: inputs.shadow_maps,
             photons: &self.photons,
+            cells: self.emission.as_ref().map(|e| &e.0),
             sample_offset: scene.sample_offset,
             timestamps: scene.timestamps,
         };
@@ -222,6 +252,9 @@ impl IndirectScene {
     pub(super) fn memory_by_resource(&self) -> Vec<(&'static str, u64)> {
         let mut uniforms = self.emitter.memory_use();
         let mut list = vec![("photons", self.photons.memory_use())];
+        if let Some((cells, own)) = &self.emission {
+            list.push(("emission_cells", cells.memory_use() + own.memory_use()));
+        }
         if let Some(image_space) = &self.image_space {
             let maps = image_space.env_maps.memory_use() + image_space.capture.memory_use();
             list.push(("env_maps", maps));

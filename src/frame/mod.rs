@@ -1,6 +1,7 @@
 //! Layer 4: everything composed. [`Settings`] say how much to spend, [`Plan`] which stages a scene needs and why,
 //! [`GiRenderer`] records them in order. It uses public passes only: whatever it does, a host can do by hand.
 
+mod emission_schedule;
 mod env_map_placement;
 mod gi_renderer;
 mod indirect_scene;

@@ -24,6 +24,8 @@ pub enum Stage {
     EnvMapCapture,
     /// How deep the surfaces in it lie, coarsely.
     DepthHierarchyBuild,
+    /// Which photons count for the picture.
+    EmissionImportance,
     /// Photons from lights.
     PhotonEmitter,
     /// Photons from surface to surface, as environment maps see them.
@@ -105,6 +107,7 @@ impl Plan {
                 stage(Stage::EnvMapSelector, selection),
                 stage(Stage::EnvMapCapture, maps),
                 stage(Stage::DepthHierarchyBuild, hierarchies),
+                stage(Stage::EmissionImportance, importance(&indirect, settings)),
                 stage(Stage::PhotonEmitter, indirect.clone()),
                 stage(Stage::ImageSpaceTracer, image_space),
                 stage(Stage::BvhTracer, bvh),
@@ -170,6 +173,14 @@ fn map_stages(indirect: &(bool, String), settings: &Settings) -> [(bool, String)
         (true, all),
         hierarchies,
     ]
+}
+
+fn importance(indirect: &(bool, String), settings: &Settings) -> (bool, String) {
+    match (indirect.0, settings.emission_importance > 0.0) {
+        (false, _) => indirect.clone(),
+        (true, false) => (false, "settings spread photons evenly".to_owned()),
+        (true, true) => (true, "photons start where paths were seen".to_owned()),
+    }
 }
 
 /// The tracer in image space, and that of triangles.

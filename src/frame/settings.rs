@@ -57,6 +57,10 @@ pub struct Settings {
     pub frames: u32,
     /// Photons emitted a frame. Cost grows in proportion; noise falls as the square root.
     pub photons: u32,
+    /// Share of the photons, from 0 and below 1, that start in those directions of their light whose paths were seen in the
+    /// frames before; the others are spread evenly. Pays where much of the light never comes before the eye, as that of a sun
+    /// over a building; costs a look at each photon.
+    pub emission_importance: f32,
     /// Surfaces that light scatters at before the one the eye sees, 0 to 64. 0: direct light only. Each costs a trace;
     /// leaving out bounces darkens.
     pub bounces: u32,
@@ -108,6 +112,7 @@ impl Settings {
     pub fn fast() -> Self {
         Self {
             photons: 60_000,
+            emission_importance: 0.0,
             env_map_count: 12,
             env_map_size: 64,
             shadow_map_size: 256,
@@ -137,6 +142,7 @@ impl Settings {
         Self {
             frames: 1,
             photons: 500_000,
+            emission_importance: 0.0,
             bounces: 3,
             env_map_count: 12,
             env_maps_at_lights: 0,
@@ -162,6 +168,7 @@ impl Settings {
         Self {
             frames: 64,
             photons: 200_000,
+            emission_importance: 0.0,
             env_map_count: 16,
             env_map_size: 256,
             shadow_map_size: 1024,
@@ -315,6 +322,12 @@ macro_rules! choice {
 const KNOBS: &[Knob] = &[
     field!("frames", "1 or more", frames, |v| v >= 1),
     field!("photons", "0 to 100000000", photons, |v| v <= 100_000_000),
+    field!(
+        "emission.importance",
+        "0 or more, and below 1",
+        emission_importance,
+        |v| (0.0..1.0).contains(&v)
+    ),
     field!("bounces", "0 to 64", bounces, |v| v <= MAX_BOUNCES),
     field!("env_maps.count", "1 to 31", env_map_count, |v| (1..=MAX_SELECTED)
         .contains(&v)),

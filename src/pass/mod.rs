@@ -11,6 +11,7 @@ mod capture;
 pub(crate) mod composite;
 pub(crate) mod depth_hierarchy_build;
 pub(crate) mod direct_light;
+pub(crate) mod emission_importance;
 mod env_map_capture;
 pub(crate) mod env_map_selector;
 mod full_screen;
@@ -32,6 +33,9 @@ pub use bvh_tracer::{BvhTracer, BvhTracerInputs, BvhTracerRayInputs, BvhTracerRe
 pub use composite::{Composite, CompositeInputs, CompositeResources, CompositeSettings};
 pub use depth_hierarchy_build::{DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources};
 pub use direct_light::{DirectLight, DirectLightInputs, DirectLightResources};
+pub use emission_importance::{
+    EmissionImportance, EmissionImportanceInputs, EmissionImportanceResources, EmissionUpdateInputs,
+};
 pub use env_map_capture::{EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources};
 pub use env_map_selector::{
     CoverageMeasure, EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings,

@@ -6,7 +6,7 @@
 
 use super::dispatch_64;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
-use crate::resource::{Lights, Photons, ShadowMaps};
+use crate::resource::{EmissionCells, Lights, Photons, ShadowMaps};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -27,12 +27,17 @@ pub(crate) mod gpu {
 /// Bindings of `shaders/pass/photon_emitter.wgsl`, in order.
 pub(crate) const SLOTS: [Slot; 4] = [Slot::Uniform, Slot::Storage, Slot::UintArray, Slot::StorageMut];
 
+/// Bindings of its group 1.
+pub(crate) const CELL_SLOTS: [Slot; 1] = [Slot::Storage];
+
 /// The pass.
 #[derive(Debug)]
 pub struct PhotonEmitter {
     device: wgpu::Device,
     layout: wgpu::BindGroupLayout,
+    cell_layout: wgpu::BindGroupLayout,
     emit: wgpu::ComputePipeline,
+    emit_by_cells: wgpu::ComputePipeline,
 }
 
 /// Uniforms and bind groups.
@@ -53,6 +58,8 @@ pub struct PhotonEmitterInputs<'a> {
     pub shadow_maps: &'a ShadowMaps,
     /// Hop 0 is written.
     pub photons: &'a Photons,
+    /// How densely photons start where; `None`: evenly.
+    pub cells: Option<&'a EmissionCells>,
     /// First index into the random sequence: constant in real time, so that nothing flickers; advanced by the number of
     /// photons per frame when accumulating.
     pub sample_offset: u32,
@@ -63,21 +70,29 @@ pub struct PhotonEmitterInputs<'a> {
 impl PhotonEmitter {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
-        let layout = device::layout(device, "lightfall::PhotonEmitter", wgpu::ShaderStages::COMPUTE, &SLOTS);
-        let emit = device::compute_pipeline(
-            device,
-            &ComputeSpec {
-                label: "lightfall::PhotonEmitter::emit",
+        let label = "lightfall::PhotonEmitter";
+        let layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &SLOTS);
+        let cell_layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &CELL_SLOTS);
+        let pipeline = |label, entry_point, layouts: &[&wgpu::BindGroupLayout]| {
+            let spec = ComputeSpec {
+                label,
                 source: wgsl::PHOTON_EMITTER,
-                entry_point: "emit_photons",
-                layouts: &[&layout],
+                entry_point,
+                layouts,
                 constants: &[],
-            },
-        );
+            };
+            device::compute_pipeline(device, &spec)
+        };
         Self {
             device: device.clone(),
+            emit: pipeline("lightfall::PhotonEmitter::emit", "emit_photons", &[&layout]),
+            emit_by_cells: pipeline(
+                "lightfall::PhotonEmitter::emit_by_cells",
+                "emit_photons_by_cells",
+                &[&layout, &cell_layout],
+            ),
             layout,
-            emit,
+            cell_layout,
         }
     }
 
@@ -107,8 +122,18 @@ impl PhotonEmitter {
         ];
         let label = "lightfall::PhotonEmitter";
         let group = resources.groups.get(&self.device, label, &self.layout, &bound);
+        let cell_group = inputs.cells.map(|cells| {
+            let bound = [cells.tables().into()];
+            resources.groups.get(&self.device, label, &self.cell_layout, &bound)
+        });
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
-        pass.set_pipeline(&self.emit);
+        match &cell_group {
+            None => pass.set_pipeline(&self.emit),
+            Some(cell_group) => {
+                pass.set_pipeline(&self.emit_by_cells);
+                pass.set_bind_group(1, cell_group, &[]);
+            }
+        }
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(groups[0], groups[1], 1);
     }

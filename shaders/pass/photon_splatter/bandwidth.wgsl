@@ -35,7 +35,7 @@ fn splat_limit(b: Bandwidth, photon: Photon) -> f32 {
 
 // No kernel of this photon is wider.
 fn splat_widest(b: Bandwidth, photon: Photon) -> f32 {
-    return min(b.scale * inverseSqrt(b.lowest), splat_limit(b, photon));
+    return min(b.scale * inverseSqrt(b.lowest * photon_boost(photon.state)), splat_limit(b, photon));
 }
 
 // Radius of a photon's kernel, unit frame (Yao et al. 2010, section 6, made dimensionless by area and pdf); 0 where nothing
@@ -49,6 +49,9 @@ fn splat_radius(b: Bandwidth, photon: Photon) -> f32 {
         h *= inverseSqrt(clamp(photon.density / b.uniform_density, b.lowest, b.highest));
     } else if b.rule == BANDWIDTH_BIN {
         h *= inverseSqrt(clamp(bin_density(b, photon) / b.uniform_count, b.lowest, b.highest));
+    }
+    if b.rule == BANDWIDTH_DENSITY {
+        h *= inverseSqrt(photon_boost(photon.state));
     }
     h = min(h, splat_limit(b, photon));
     return select(0.0, h, h > 0.0);

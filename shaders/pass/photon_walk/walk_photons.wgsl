@@ -38,7 +38,7 @@ fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) ->
     let distance = max(hit.distance, WALK_SHORTEST);
     return Photon(
         hit.position,
-        select(PHOTON_STORED, PHOTON_STORED | PHOTON_TENTATIVE, hit.kind == HIT_TENTATIVE),
+        select(PHOTON_STORED, PHOTON_STORED | PHOTON_TENTATIVE, hit.kind == HIT_TENTATIVE) | (photon.state & PHOTON_EMISSION),
         flux,
         WALK_INVERSE_PI * cosines / (distance * distance),
         octahedral_pack(hit.normal),

@@ -1,0 +1,56 @@
+// Makes the tables of emission cells from what was counted: a workgroup for each light, an invocation for each cell.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read_write> counts: array<u32>;
+// Of each cell: paths that started there and hops of theirs that were seen, over the frames
+@group(0) @binding(2) var<storage, read_write> history: array<vec2f>;
+@group(0) @binding(3) var<storage, read_write> emission_tables: array<EmissionTable>;
+
+const CELLS: u32 = 256u;
+
+var<workgroup> shares: array<f32, CELLS>;
+var<workgroup> columns: array<f32, EMISSION_CELLS>;
+
+// A path is worth as much as what it brings scatters least: the error of a mean of samples is least where these are taken
+// in proportion to the root of the mean square of their values, here of the hops that are seen.
+@compute @workgroup_size(256)
+fn update_tables(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) cell: u32) {
+    let light = group.x;
+    let at = light * CELLS + cell;
+    let counted = params.kept * history[at] + vec2f(f32(counts[2u * at]), f32(counts[2u * at + 1u]));
+    history[at] = counted;
+    counts[2u * at] = 0u;
+    counts[2u * at + 1u] = 0u;
+    shares[cell] = sqrt(counted.y / max(counted.x, 1.0));
+    workgroupBarrier();
+    let column = cell / EMISSION_CELLS;
+    let row = cell % EMISSION_CELLS;
+    if row == 0u {
+        var sum = 0.0;
+        for (var i = 0u; i < EMISSION_CELLS; i++) {
+            sum += shares[cell + i];
+        }
+        columns[column] = sum;
+    }
+    workgroupBarrier();
+    var total = 0.0;
+    for (var i = 0u; i < EMISSION_CELLS; i++) {
+        total += columns[i];
+    }
+    // Where nothing was seen, all cells are alike.
+    let directed = select(0.0, params.share, total > 0.0);
+    let scale = directed / max(total, 1e-30);
+    let even = (1.0 - directed) / f32(EMISSION_CELLS);
+    var sum = 0.0;
+    for (var i = 0u; i <= row; i++) {
+        sum += scale * shares[column * EMISSION_CELLS + i] + even / f32(EMISSION_CELLS);
+    }
+    emission_tables[light].rows[cell] = sum / (scale * columns[column] + even);
+    if row == 0u {
+        var end = 0.0;
+        for (var i = 0u; i <= column; i++) {
+            end += scale * columns[i] + even;
+        }
+        emission_tables[light].columns[column] = end;
+    }
+}

@@ -1,0 +1,215 @@
+//! Sends photons where they count for the picture: more of them start in those parts of a light's emission whose paths were
+//! seen in earlier frames, each with less flux, so that no light is lost or gained.
+//!
+//! Inputs: [`Photons`] and a [`GBuffer`] of an earlier frame. Output: [`EmissionCells`], for [`PhotonEmitter`]. Cells get
+//! photons in proportion to the root of the share of their paths that was seen. Cost: a photon record and a depth texel for
+//! each hop and view, and a workgroup a light. Limits: 16 × 16 cells a light; how photons are divided among lights stays.
+//!
+//! [`PhotonEmitter`]: super::PhotonEmitter
+
+use super::dispatch_64;
+use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
+use crate::resource::{EmissionCells, GBuffer, Photons};
+use crate::{Error, Timestamps, wgsl};
+
+pub(crate) mod gpu {
+    use bytemuck::{Pod, Zeroable};
+
+    /// Twin of `Params` in `shaders/pass/emission_importance/params.wgsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Params {
+        pub(crate) path_count: u32,
+        pub(crate) slot_count: u32,
+        pub(crate) light_count: u32,
+        pub(crate) row: u32,
+        pub(crate) share: f32,
+        pub(crate) kept: f32,
+    }
+}
+
+/// Bindings of `shaders/pass/emission_importance/count_visible.wgsl`, in order.
+pub(crate) const COUNT_SLOTS: [Slot; 5] = [
+    Slot::Uniform,
+    Slot::Storage,
+    Slot::StorageMut,
+    Slot::Uniform,
+    Slot::Texture,
+];
+
+/// Bindings of `shaders/pass/emission_importance/update_tables.wgsl`, in order.
+pub(crate) const UPDATE_SLOTS: [Slot; 4] = [Slot::Uniform, Slot::StorageMut, Slot::StorageMut, Slot::StorageMut];
+
+/// Part of what was counted in earlier frames that an update keeps: what a table says changes over a few frames.
+const KEPT: f32 = 0.75;
+
+/// The pass.
+#[derive(Debug)]
+pub struct EmissionImportance {
+    device: wgpu::Device,
+    count_layout: wgpu::BindGroupLayout,
+    update_layout: wgpu::BindGroupLayout,
+    count: wgpu::ComputePipeline,
+    update: wgpu::ComputePipeline,
+}
+
+/// Uniforms and bind groups, of a view or of the update.
+#[derive(Debug)]
+pub struct EmissionImportanceResources {
+    params: wgpu::Buffer,
+    groups: BindGroupCache,
+}
+
+/// What a view gives it.
+#[derive(Debug, Clone, Copy)]
+pub struct EmissionImportanceInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// Paths of this frame.
+    pub photons: &'a Photons,
+    /// How many lights they started from.
+    pub light_count: u32,
+    /// Where they are seen.
+    pub g_buffer: &'a GBuffer,
+    /// What is counted is added.
+    pub cells: &'a EmissionCells,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+/// What an update needs.
+#[derive(Debug, Clone, Copy)]
+pub struct EmissionUpdateInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// Lights of the frame.
+    pub light_count: u32,
+    /// The tables are written, the counts cleared.
+    pub cells: &'a EmissionCells,
+    /// Share of the photons that start where paths were seen, in [0, 1); the others are spread evenly, so that nothing is
+    /// overlooked for good.
+    pub share: f32,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+impl EmissionImportance {
+    /// The pass on this device. Needs no features and no more than default limits.
+    pub fn new(device: &wgpu::Device) -> Self {
+        let layout = |label, slots: &[Slot]| device::layout(device, label, wgpu::ShaderStages::COMPUTE, slots);
+        let count_layout = layout("lightfall::EmissionImportance::count", &COUNT_SLOTS);
+        let update_layout = layout("lightfall::EmissionImportance::update", &UPDATE_SLOTS);
+        let pipeline = |label, source, entry_point, layout| {
+            let spec = ComputeSpec {
+                label,
+                source,
+                entry_point,
+                layouts: &[layout],
+                constants: &[],
+            };
+            device::compute_pipeline(device, &spec)
+        };
+        Self {
+            device: device.clone(),
+            count: pipeline(
+                "lightfall::EmissionImportance::count",
+                wgsl::EMISSION_IMPORTANCE_COUNT,
+                "count_visible",
+                &count_layout,
+            ),
+            update: pipeline(
+                "lightfall::EmissionImportance::update",
+                wgsl::EMISSION_IMPORTANCE_UPDATE,
+                "update_tables",
+                &update_layout,
+            ),
+            count_layout,
+            update_layout,
+        }
+    }
+
+    /// Records the count of what a view sees of the paths, after the walk and the view's depth. Each view has resources of
+    /// its own.
+    pub fn record(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut EmissionImportanceResources,
+        inputs: &EmissionImportanceInputs<'_>,
+    ) {
+        let (groups, row) = dispatch_64(inputs.photons.slots());
+        let params = gpu::Params {
+            path_count: inputs.photons.count(),
+            slot_count: inputs.photons.slots(),
+            light_count: inputs.light_count,
+            row,
+            share: 0.0,
+            kept: 0.0,
+        };
+        inputs
+            .queue
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        let bound = [
+            (&resources.params).into(),
+            inputs.photons.buffer().into(),
+            inputs.cells.counts().into(),
+            inputs.g_buffer.view_buffer().into(),
+            (&inputs.g_buffer.views().depth).into(),
+        ];
+        let label = "lightfall::EmissionImportance::count";
+        let group = resources.groups.get(&self.device, label, &self.count_layout, &bound);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(&self.count);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
+    }
+
+    /// Records the update of the tables by what views have counted since the last one, before the emission.
+    pub fn record_update(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut EmissionImportanceResources,
+        inputs: &EmissionUpdateInputs<'_>,
+    ) {
+        let params = gpu::Params {
+            path_count: 0,
+            slot_count: 0,
+            light_count: inputs.light_count,
+            row: 0,
+            share: inputs.share,
+            kept: KEPT,
+        };
+        inputs
+            .queue
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        let bound = [
+            (&resources.params).into(),
+            inputs.cells.counts().into(),
+            inputs.cells.history().into(),
+            inputs.cells.tables().into(),
+        ];
+        let label = "lightfall::EmissionImportance::update";
+        let group = resources.groups.get(&self.device, label, &self.update_layout, &bound);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(&self.update);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(inputs.light_count, 1, 1);
+    }
+}
+
+impl EmissionImportanceResources {
+    /// Resources on this device.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] if the device grants next to nothing.
+    pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
+        Ok(Self {
+            params: device::uniform_buffer::<gpu::Params>(device, "lightfall::EmissionImportance::params")?,
+            groups: BindGroupCache::default(),
+        })
+    }
+
+    /// Bytes allocated.
+    pub fn memory_use(&self) -> u64 {
+        self.params.size()
+    }
+}
