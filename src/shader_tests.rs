@@ -668,6 +668,12 @@ fn photon_states_are_the_same_on_both_sides() {
     }
     assert_eq!(shader.constant("PHOTON_FIRST_HIT"), Literal::U32(Photon::FIRST_HIT));
     assert_eq!(shader.constant("PHOTON_TENTATIVE"), Literal::U32(Photon::TENTATIVE));
+    assert_eq!(shader.constant("PHOTON_BOOST_ONE"), Literal::F32(Photon::BOOST_ONE));
+    assert_eq!(shader.constant("PHOTON_BOOST_STEPS"), Literal::F32(Photon::BOOST_STEPS));
+    assert_eq!(
+        shader.constant("EMISSION_CELLS"),
+        Literal::U32(emission_cells::CELLS as u32)
+    );
     let Literal::U32(mask) = shader.constant("PHOTON_STATE_MASK") else {
         panic!("PHOTON_STATE_MASK is not a u32");
     };

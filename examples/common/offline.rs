@@ -20,7 +20,7 @@ pub(crate) enum Component {
 }
 
 /// Frames before the first that is shown, where frames depend on those before.
-const WARM_UP: u32 = 8;
+const WARM_UP: u32 = 3;
 
 /// A scene on the GPU, ready to render frames of one camera.
 pub(crate) struct Offline<'a> {
@@ -31,6 +31,8 @@ pub(crate) struct Offline<'a> {
     bvh: Option<BvhGeometry>,
     pub(crate) view: ViewResources,
     accumulator: Option<(Accumulator, AccumulatorResources)>,
+    /// Whether every frame is taken for one of a scene that changes; not while frames are accumulated.
+    pub(crate) in_motion: bool,
     scene: Scene,
     summary: SceneSummary,
     camera: usize,
@@ -74,6 +76,7 @@ impl<'a> Offline<'a> {
             renderer,
             geometry,
             bvh,
+            in_motion: accumulator.is_none(),
             accumulator,
             scene,
             summary,
@@ -82,7 +85,7 @@ impl<'a> Offline<'a> {
             composite,
         };
         // Where photons start depends on what was seen of those before: a frame in motion has others before it.
-        if settings.emission_importance > 0.0 && offline.accumulator.is_none() {
+        if settings.emission_importance > 0.0 && offline.in_motion {
             for _ in 0..WARM_UP {
                 offline.render_frame(None)?;
             }
@@ -90,11 +93,11 @@ impl<'a> Offline<'a> {
         Ok(offline)
     }
 
-    /// Renders the next frame and waits for it: as of a scene in motion, unless frames are accumulated.
+    /// Renders the next frame and waits for it.
     pub(crate) fn render_frame(&mut self, timestamps: Option<&Timestamps>) -> Result<(), Error> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
         let frame = self.renderer.set_scene(queue, &self.summary, &self.scene.lights)?;
-        if self.accumulator.is_none() {
+        if self.in_motion {
             self.renderer.geometry_changed();
         }
         if let Some(bvh) = &mut self.bvh {

@@ -22,8 +22,8 @@ use crate::pass::{
 #[cfg(feature = "bvh")]
 use crate::resource::BvhGeometry;
 use crate::resource::{
-    CameraView, CapturePurpose, CaptureView, DepthHierarchy, EnvMaps, GBuffer, Geometry, Irradiance, Lights,
-    MarkedPixels, NearestOccluders, Photons, PrepareContext, Radiance, ShadowMaps, Subsampling, Visibility,
+    CameraView, CapturePurpose, CaptureView, DepthHierarchy, EmissionCells, EnvMaps, GBuffer, Geometry, Irradiance,
+    Lights, MarkedPixels, NearestOccluders, Photons, PrepareContext, Radiance, ShadowMaps, Subsampling, Visibility,
 };
 use crate::scene::{Camera, Light, LightKind, Projection, SceneBounds, SceneSummary, UnitFrame};
 use crate::{Error, Timestamps};
@@ -854,6 +854,11 @@ impl GiRenderer {
     /// Shadow maps, while there is a punctual light.
     pub fn shadow_maps(&self) -> Option<&ShadowMaps> {
         self.direct.as_ref().map(|d| &d.shadow_maps)
+    }
+
+    /// Where photons start, while [`Settings::emission_importance`] is above 0 and there is indirect light.
+    pub fn emission_cells(&self) -> Option<&EmissionCells> {
+        self.indirect.as_ref().and_then(IndirectScene::emission_cells)
     }
 
     /// Photons, while there is indirect light.

@@ -14,7 +14,9 @@ pub struct Photon {
     /// Where the hop ended, unit frame.
     pub position: [f32; 3],
     /// Low two bits: a [`PhotonState`]. Bit 8: the path came straight from its light. Bit 9: the tracer is not sure of the
-    /// hop. Others 0.
+    /// hop. Bits 16 to 31, the same for all hops of a path: see [`EmissionCells`](super::EmissionCells); bits 16 to 23 are the
+    /// cell that it started in, bits 24 to 31 b where photons start 2^((b − 128) / 16) times as densely there as if they were
+    /// spread evenly, 0 where they are. Others 0.
     pub state: u32,
     /// Radiant flux that the hop carried, unit frame, before the surface takes its share.
     pub flux: [f32; 3],
@@ -51,6 +53,9 @@ impl Photon {
     /// Bit of `state` that marks a hop of which the tracer is not sure: a surer one should walk it again.
     pub const TENTATIVE: u32 = 512;
 
+    pub(crate) const BOOST_ONE: f32 = 128.0;
+    pub(crate) const BOOST_STEPS: f32 = 16.0;
+
     /// What became of this hop.
     pub fn state(&self) -> PhotonState {
         match self.state & 3 {
@@ -84,6 +89,14 @@ impl Photon {
     pub fn pack_reflectance(rgb: [f32; 3]) -> u32 {
         let steps = |value: f32, most: f32| (value.clamp(0.0, 1.0) * most).round() as u32;
         steps(rgb[0], 2047.0) | steps(rgb[1], 2047.0) << 11 | steps(rgb[2], 1023.0) << 22
+    }
+
+    /// How many times as densely photons start where this one's path did as if they were spread evenly, within 2.2 %.
+    pub fn emission_boost(&self) -> f32 {
+        match self.state >> 24 {
+            0 => 1.0,
+            steps => ((steps as f32 - Self::BOOST_ONE) / Self::BOOST_STEPS).exp2(),
+        }
     }
 
     /// Reflectance of the surface hit.
