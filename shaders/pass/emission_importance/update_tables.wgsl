@@ -7,8 +7,11 @@
 @group(0) @binding(3) var<storage, read_write> emission_tables: array<EmissionTable>;
 
 const CELLS: u32 = 256u;
+// Until so many hops of a cell's paths were seen, it counts as much like the mean of all cells: what few hops say is chance.
+const SEEN_BY_CHANCE: f32 = 4.0;
 
 var<workgroup> shares: array<f32, CELLS>;
+var<workgroup> sums: array<vec2f, CELLS>;
 var<workgroup> columns: array<f32, EMISSION_CELLS>;
 
 // A path is worth as much as what it brings scatters least: the error of a mean of samples is least where these are taken
@@ -21,7 +24,18 @@ fn update_tables(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_
     history[at] = counted;
     counts[2u * at] = 0u;
     counts[2u * at + 1u] = 0u;
-    shares[cell] = sqrt(counted.y / max(counted.x, 1.0));
+    sums[cell] = counted;
+    workgroupBarrier();
+    for (var half = CELLS / 2u; half > 0u; half /= 2u) {
+        if cell < half {
+            sums[cell] += sums[cell + half];
+        }
+        workgroupBarrier();
+    }
+    // Paths of which so many hops are seen, were all cells alike.
+    let paths_by_chance = SEEN_BY_CHANCE * sums[0].x / max(sums[0].y, 1.0);
+    let is_any_seen = f32(sums[0].y > 0.0);
+    shares[cell] = is_any_seen * sqrt((counted.y + SEEN_BY_CHANCE) / max(counted.x + paths_by_chance, 1.0));
     workgroupBarrier();
     let column = cell / EMISSION_CELLS;
     let row = cell % EMISSION_CELLS;
