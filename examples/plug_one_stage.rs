@@ -20,8 +20,8 @@ use lightfall::pass::{
     UpsamplerSettings,
 };
 use lightfall::resource::{
-    CameraView, CapturePurpose, CaptureView, EnvMaps, GBuffer, GBufferViews, Geometry as _, Irradiance, NormalEncoding,
-    Photon, PhotonState, Photons, PrepareContext, Radiance, Subsampling,
+    CameraView, CapturePurpose, CaptureView, EnvMaps, GBuffer, GBufferViews, Geometry as _, Irradiance, Photon,
+    PhotonState, Photons, PrepareContext, Radiance, Subsampling,
 };
 use lightfall::scene::{SceneBounds, UnitFrame};
 use lightfall::{Error, wgpu};
@@ -125,13 +125,10 @@ impl IndirectLight {
             GBufferViews {
                 depth: targets.depth.clone(),
                 normal: targets.normal.clone(),
-                normal_encoding: if engine.formats.has_half_offset() {
-                    NormalEncoding::HalfOffset
-                } else {
-                    NormalEncoding::Signed
-                },
+                normal_encoding: engine.formats.normals().into(),
                 base_color: targets.base_color.clone(),
                 emission: black_texel(device),
+                surfaces: None,
                 rectangle: Some([0, 0, size[0], size[1]]),
             },
         )?;
@@ -239,7 +236,7 @@ pub(crate) fn photon_records(frame: &UnitFrame, landings: &[Option<Landing>], pa
             normal: Photon::pack_unit_vector(landing.normal.as_vec3()),
             direction: Photon::pack_unit_vector(landing.direction.as_vec3()),
             reflectance: Photon::pack_reflectance(landing.reflectance.as_vec3().to_array()),
-            light: 0,
+            light_and_surface: 0,
         }
     };
     landings.iter().enumerate().map(record).collect()

@@ -225,11 +225,11 @@ fn twins() -> Vec<Twin> {
             half_extent, first_photon, photon_count, density, disc_radius, extent, _pad,
         }),
         twin!(wgsl::PHOTON_EMITTER, "Photon", Photon {
-            position, state, flux, density, normal, direction, reflectance, light,
+            position, state, flux, density, normal, direction, reflectance, light_and_surface,
         }),
         twin!(wgsl::MESH_GEOMETRY, "View", mesh_geometry::gpu::MeshView { view_projection, eye }),
         twin!(wgsl::MESH_GEOMETRY, "Instance", mesh_geometry::gpu::MeshInstance {
-            transform, normal_transform, material, mirrored, _pad,
+            transform, normal_transform, material, mirrored, surface, _pad,
         }),
         twin!(wgsl::MESH_GEOMETRY, "Material", mesh_geometry::gpu::MeshMaterial {
             base_color, alpha_cutoff, emission, _pad,

@@ -77,12 +77,12 @@ fn photons_start_as_densely_as_the_table_says_and_bring_as_much_light() {
     let tables = shares(&gpu, &led, scene.lights.len());
     let (even, led) = (photons(&gpu, &even), photons(&gpu, &led));
     for (light, table) in tables.iter().enumerate() {
-        let own: Vec<&Photon> = led[..count].iter().filter(|p| p.light as usize == light).collect();
+        let own: Vec<&Photon> = led[..count].iter().filter(|p| p.light() as usize == light).collect();
         let total: f64 = table.iter().sum();
         assert!((total - 1.0).abs() < 1e-5, "light {light}: shares sum up to {total}");
         let evenly = 1.0 / (CELLS * CELLS) as f64;
         let largest = table.iter().copied().fold(0.0, f64::max) / evenly;
-        let flux_of_one = f64::from(even.iter().find(|p| p.light as usize == light).unwrap().flux[1]);
+        let flux_of_one = f64::from(even.iter().find(|p| p.light() as usize == light).unwrap().flux[1]);
         let mut found = vec![0.0; CELLS * CELLS];
         for photon in &own {
             let cell = (photon.state >> 16 & 255) as usize;

@@ -299,6 +299,7 @@ fn views_of_a_host_that_do_not_fit_are_refused_by_name() {
             normal_encoding: NormalEncoding::Octahedral,
             base_color: texture(device, F::Rgba8UnormSrgb, [8, 8], 1),
             emission: texture(device, F::Rgba16Float, [8, 8], 1),
+            surfaces: Some(texture(device, F::R16Uint, [8, 8], 1)),
             rectangle: Some([2, 2, 6, 6]),
         };
         let g_buffer = GBuffer::from_views(device, good()).unwrap();
@@ -333,6 +334,16 @@ fn views_of_a_host_that_do_not_fit_are_refused_by_name() {
         refused(
             |d, v| v.emission = texture(d, F::Rgba16Float, [1, 8], 1),
             "emission",
+            "size",
+        );
+        refused(
+            |d, v| v.surfaces = Some(texture(d, F::R32Float, [8, 8], 1)),
+            "surfaces",
+            "format",
+        );
+        refused(
+            |d, v| v.surfaces = Some(texture(d, F::R16Uint, [1, 1], 1)),
+            "surfaces",
             "size",
         );
         refused(|_, v| v.rectangle = Some([4, 4, 5, 1]), "rectangle", "size");

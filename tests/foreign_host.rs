@@ -22,7 +22,7 @@ use lightfall::pass::{
 };
 use lightfall::resource::{
     CapturePurpose, CaptureTargets, CaptureView, EnvMaps, GBuffer, GBufferViews, Geometry, Irradiance, MeshGeometry,
-    NormalEncoding, Photons, PrepareContext, Radiance, Subsampling,
+    Photons, PrepareContext, Radiance, Subsampling,
 };
 use lightfall::scene::{Instance, Light, Material, Mesh, Scene, SceneSummary};
 use lightfall::{read_buffer_blocking, read_rgba32float_blocking, wgpu};
@@ -150,8 +150,8 @@ fn scene_of(world: &World) -> Scene {
 /// What `GiRenderer` makes of the engine's world, seen by the engine's camera.
 struct Composed {
     renderer: GiRenderer,
-    /// Four f16 a texel.
-    normals: Vec<[u16; 4]>,
+    /// Two f16 a texel.
+    normals: Vec<[u16; 2]>,
     indirect: Vec<[f32; 4]>,
     radiance: Vec<[f32; 4]>,
 }
@@ -287,7 +287,7 @@ fn an_engine_fed_the_renderers_photons_has_the_renderers_irradiance() {
         let engine = engine(&gpu, World::room(), Formats::WIDE, SIZE, SIZE);
         let composed = composed(&engine, subsampling);
         let indirect = fed_by(&engine, &composed);
-        let normals: Vec<[u16; 4]> = read_texels(&engine, engine.targets.normal.texture());
+        let normals: Vec<[u16; 2]> = read_texels(&engine, engine.targets.normal.texture());
         assert!(normals == composed.normals);
         let found = read(&engine, indirect.irradiance.view());
         assert!(found.iter().filter(|p| p[0] > 0.0).count() > found.len() / 2);
@@ -296,10 +296,11 @@ fn an_engine_fed_the_renderers_photons_has_the_renderers_irradiance() {
     assert_no_errors(&gpu);
 }
 
-/// Largest error of a normal × 0.5 + 0.5 in ten bits beside one in `rgba16float`: of the former conversion may miss 0.6
-/// of a step of 2/1023, of the latter half of one of 2^-11; in three components, and twice that for normalising them
-/// again.
-const NORMAL_ERROR: f64 = 2.0 * 1.7321 * (1.2 / 1023.0 + 1.0 / 4096.0);
+/// Largest error of a normal × 0.5 + 0.5 in ten bits beside an octahedral one in `rg16float`: of the former conversion may miss
+/// 0.6 of a step of 2/1023, in three components; of the latter half a step of 2^-11 in two coordinates, which move the point
+/// of the octahedron by at most 2.5 times that, and the octahedron comes no nearer to the origin than 1/√3. Twice that for
+/// normalising them again.
+const NORMAL_ERROR: f64 = 2.0 * 1.7321 * (1.2 / 1023.0 + 2.5 / 4096.0);
 
 #[test]
 fn ten_bits_of_normal_in_a_part_of_larger_textures_change_no_bit_of_irradiance() {
@@ -476,10 +477,11 @@ fn a_part_anywhere_in_larger_textures_is_lit_as_if_it_were_alone() {
     let targets = &engine.targets;
     let views = GBufferViews {
         depth: moved(&targets.depth, wgpu::TextureFormat::R32Float, 4),
-        normal: moved(&targets.normal, engine.formats.normal, 8),
-        normal_encoding: NormalEncoding::Signed,
+        normal: moved(&targets.normal, engine.formats.normal, 4),
+        normal_encoding: engine.formats.normals().into(),
         base_color: moved(&targets.base_color, engine.formats.base_color, 8),
         emission: moved(&targets.base_color, engine.formats.base_color, 8),
+        surfaces: None,
         rectangle: Some([at[0], at[1], SIZE[0], SIZE[1]]),
     };
     let mut g_buffer = GBuffer::from_views(device, views).unwrap();

@@ -287,7 +287,7 @@ fn floor_hits(count: usize, mut is_stored: impl FnMut(usize) -> bool) -> Vec<Pho
         normal: Photon::pack_unit_vector(Vec3::Y),
         direction: Photon::pack_unit_vector(Vec3::NEG_Y),
         reflectance: Photon::pack_reflectance([0.5; 3]),
-        light: 0,
+        light_and_surface: 0,
     };
     let state = |stored| {
         if stored {

@@ -23,6 +23,11 @@ fn plane_g_buffer(gpu: &Gpu) -> GBuffer {
 
 /// The same where it is cut away in pixels whose mask is 0.
 fn masked_g_buffer(gpu: &Gpu, mask: &[u8]) -> GBuffer {
+    numbered_g_buffer(gpu, mask, None)
+}
+
+/// The same with a number of the surface for each pixel.
+fn numbered_g_buffer(gpu: &Gpu, mask: &[u8], surfaces: Option<&[u16]>) -> GBuffer {
     let base_color: Vec<u8> = mask.iter().flat_map(|&alpha| [255, 255, 255, alpha]).collect();
     let texture = |format: wgpu::TextureFormat, texel: &[u8]| {
         let size = wgpu::Extent3d {
@@ -60,6 +65,7 @@ fn masked_g_buffer(gpu: &Gpu, mask: &[u8]) -> GBuffer {
         normal_encoding: NormalEncoding::HalfOffset,
         base_color: texture(F::Rgba8Unorm, &base_color),
         emission: texture(F::Rgba8Unorm, &[0; 4]),
+        surfaces: surfaces.map(|s| texture(F::R16Uint, bytemuck::cast_slice(s))),
         rectangle: None,
     };
     let mut g_buffer = GBuffer::from_views(&gpu.device, views).unwrap();
@@ -85,7 +91,7 @@ fn photon(x: f32, y: f32, flux: [f32; 3]) -> Photon {
         normal: 0,
         direction: 0,
         reflectance: 0,
-        light: 0,
+        light_and_surface: 0,
     }
 }
 
@@ -375,6 +381,59 @@ fn light_at_the_rim_of_a_plate_is_as_bright_as_in_its_middle_once_kernels_are_cu
         println!("{kernel:?}: {off:?} uncorrected, {corrected:?} corrected");
         assert!(off.0 < 0.35 && off.1 < 1.01, "{kernel:?}: a quarter in the corners");
         assert!(corrected.0 > 0.87 && corrected.1 < 1.15, "{kernel:?}: {corrected:?}");
+    }
+    assert_no_errors(&gpu);
+}
+
+/// Two surfaces in one plane that meet in the view's middle, 3 to the left of 70, and a plane of 1 m² half on either with even
+/// light on 3 alone, of photons on `surface`.
+fn two_surfaces(gpu: &Gpu, surface: u32) -> (GBuffer, Vec<Photon>) {
+    let is_left = |i: u32| i % SIZE < SIZE / 2;
+    let mask: Vec<u8> = (0..SIZE * SIZE).map(|i| if is_on_plate(i) { 255 } else { 0 }).collect();
+    let numbers: Vec<u16> = (0..SIZE * SIZE).map(|i| if is_left(i) { 3 } else { 70 }).collect();
+    let (_, photons) = plate(gpu, 160);
+    let on_left = photons.into_iter().filter(|p| p.position[0] < 0.0);
+    let numbered = on_left.map(|p| Photon {
+        light_and_surface: surface << 16,
+        ..p
+    });
+    (numbered_g_buffer(gpu, &mask, Some(&numbers)), numbered.collect())
+}
+
+#[test]
+fn light_keeps_to_its_surface_and_is_whole_at_the_rim_of_it() {
+    let Some(gpu) = gpu() else { return };
+    let (g_buffer, photons) = two_surfaces(&gpu, 3);
+    let settings = PhotonSplatterSettings {
+        bandwidth: Bandwidth::Fixed(RADIUS),
+        ..Default::default()
+    };
+    // Irradiance just left and right of the border, away from the plate's rim.
+    let beside = |config: PhotonSplatterConfig, photons: &[Photon]| {
+        let pixels = splat_onto(&gpu, &g_buffer, config, photons, &settings);
+        let at = |x: u32| pixels[(SIZE / 2 * SIZE + x) as usize][0];
+        [at(SIZE / 2 - 1), at(SIZE / 2)]
+    };
+    for shape in [SplatShape::Tiled, SplatShape::Quads, SplatShape::Volumes] {
+        let keeps = PhotonSplatterConfig {
+            keeps_to_surfaces: true,
+            ..config(shape)
+        };
+        let [left, right] = beside(keeps, &photons);
+        let spilt = beside(config(shape), &photons);
+        println!("{shape:?}: {left:.3} and {right:.3} W/m² beside the border, {spilt:.3?} where light spills over");
+        assert!((left - 1.0).abs() < 0.07 && right == 0.0, "{shape:?}");
+        assert!(spilt[0] < 0.6 && spilt[1] > 0.4, "{shape:?}");
+        // No surface in particular takes part in all.
+        let unnumbered: Vec<_> = photons
+            .iter()
+            .map(|&p| Photon {
+                light_and_surface: 0,
+                ..p
+            })
+            .collect();
+        let [_, right] = beside(keeps, &unnumbered);
+        assert!(right > 0.4, "{shape:?}: {right}");
     }
     assert_no_errors(&gpu);
 }

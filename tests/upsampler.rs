@@ -120,6 +120,7 @@ fn picture(
         normal_encoding: NormalEncoding::Signed,
         base_color: texture(gpu, full, F::Rgba8Unorm, bytemuck::cast_slice(&colors)),
         emission: texture(gpu, full, F::Rgba8Unorm, bytemuck::cast_slice(&colors)),
+        surfaces: None,
         rectangle: Some([ORIGIN[0], ORIGIN[1], size[0], size[1]]),
     };
     let mut g_buffer = GBuffer::from_views(&gpu.device, views).unwrap();
@@ -923,7 +924,7 @@ fn strewn_plane(gpu: &Gpu, size: [u32; 2]) -> (Picture, Photons) {
                 normal: octahedral(normal),
                 direction: 0,
                 reflectance: 0,
-                light: 0,
+                light_and_surface: 0,
             }
         })
         .collect();

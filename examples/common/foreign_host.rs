@@ -26,6 +26,14 @@ const NEAR: f32 = 1.0 / 16.0;
 /// What dynamic offsets of uniforms must be a multiple of, on every device.
 const UNIFORM_STRIDE: u32 = 256;
 
+/// How the engine stores a unit normal.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Normals {
+    Signed = 0,
+    HalfOffset = 1,
+    Octahedral = 2,
+}
+
 /// What the engine's textures are made of.
 #[derive(Clone, Copy)]
 pub(crate) struct Formats {
@@ -43,14 +51,18 @@ impl Formats {
     };
     /// As the library's own, for comparing.
     pub(crate) const WIDE: Self = Self {
-        normal: wgpu::TextureFormat::Rgba16Float,
+        normal: wgpu::TextureFormat::Rg16Float,
         base_color: wgpu::TextureFormat::Rgba16Float,
         hdr: wgpu::TextureFormat::Rgba32Float,
     };
 
-    /// Whether normals are stored × 0.5 + 0.5.
-    pub(crate) fn has_half_offset(&self) -> bool {
-        self.normal == Self::PACKED.normal
+    /// How normals are stored: in two channels octahedral, in ten bits × 0.5 + 0.5, else as they are.
+    pub(crate) fn normals(&self) -> Normals {
+        match self.normal {
+            wgpu::TextureFormat::Rg16Float => Normals::Octahedral,
+            wgpu::TextureFormat::Rgb10a2Unorm => Normals::HalfOffset,
+            _ => Normals::Signed,
+        }
     }
 }
 
@@ -116,9 +128,26 @@ const OBJECT: &str = r"
 @group(3) @binding(0) var<uniform> tint: vec4f;
 ";
 
+/// Unit normals as points of a square.
+const OCTAHEDRON: &str = r"
+fn folded(p: vec2f) -> vec2f {
+    return (1.0 - abs(p.yx)) * select(vec2f(-1.0), vec2f(1.0), p >= vec2f(0.0));
+}
+
+fn octahedral_encode(n: vec3f) -> vec2f {
+    let p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));
+    return select(folded(p), p, n.z >= 0.0);
+}
+
+fn octahedral_decode(p: vec2f) -> vec3f {
+    let z = 1.0 - abs(p.x) - abs(p.y);
+    return normalize(vec3f(select(folded(p), p, z >= 0.0), z));
+}
+";
+
 /// Fills the G-buffer.
 const G_BUFFER: &str = r"
-override half_offset: bool;
+override normals: u32;
 
 struct Fragment {
     @builtin(position) clip: vec4f,
@@ -141,13 +170,17 @@ struct Texel {
 @fragment
 fn fragment(f: Fragment, @builtin(front_facing) front: bool) -> Texel {
     let n = normalize(select(-f.normal, f.normal, front));
-    return Texel(vec4f(select(n, 0.5 * n + 0.5, half_offset), 0.0), vec4f(f.color, 1.0));
+    var stored = select(n, 0.5 * n + 0.5, normals == 1u);
+    if normals == 2u {
+        stored = vec3f(octahedral_encode(n), 0.0);
+    }
+    return Texel(vec4f(stored, 0.0), vec4f(f.color, 1.0));
 }
 ";
 
 /// The final lighting: the lamp, with shadows of the engine's own, and indirect irradiance from elsewhere.
 const LIGHTING: &str = r"
-override half_offset: bool;
+override normals: u32;
 
 @group(2) @binding(0) var depth_texture: texture_2d<f32>;
 @group(2) @binding(1) var normal_texture: texture_2d<f32>;
@@ -183,7 +216,10 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let hom = camera.render_from_clip * vec4f(ndc, textureLoad(depth_texture, pixel, 0).r, 1.0);
     let p = hom.xyz / hom.w;
     let stored = textureLoad(normal_texture, pixel, 0).xyz;
-    let n = normalize(select(stored, 2.0 * stored - 1.0, half_offset));
+    var n = normalize(select(stored, 2.0 * stored - 1.0, normals == 1u));
+    if normals == 2u {
+        n = octahedral_decode(stored.xy);
+    }
 
     let to_lamp = frame.lamp_position - p;
     let distance_squared = dot(to_lamp, to_lamp);
@@ -284,7 +320,7 @@ impl Engine {
         };
         let meshes = world.objects.iter().map(|o| Mesh::new(device, &layouts, o)).collect();
         let targets = Targets::new(device, &formats, size, largest);
-        let constants = [("half_offset", f64::from(u8::from(formats.has_half_offset())))];
+        let constants = [("normals", f64::from(formats.normals() as u32))];
         let g_buffer_pipeline = pipeline(
             device,
             &[
@@ -293,7 +329,7 @@ impl Engine {
                 &layouts.offset_uniform,
                 &layouts.uniform,
             ],
-            &[FRAME, CAMERA, OBJECT, G_BUFFER].concat(),
+            &[FRAME, CAMERA, OBJECT, OCTAHEDRON, G_BUFFER].concat(),
             &[Vertex::layout()],
             &[formats.normal, formats.base_color],
             Some(depth_state()),
@@ -304,7 +340,7 @@ impl Engine {
         let lighting_pipeline = pipeline(
             device,
             &[&layouts.uniform, &layouts.uniform, &g_buffer_layout, &irradiance_layout],
-            &[FRAME, CAMERA, LIGHTING].concat(),
+            &[FRAME, CAMERA, OCTAHEDRON, LIGHTING].concat(),
             &[],
             &[formats.hdr],
             None,

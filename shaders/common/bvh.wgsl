@@ -10,6 +10,8 @@ const BVH_ALL: u32 = 1u;
 const BVH_CASTS_SHADOW: u32 = 2u;
 const BVH_IN_ENV_MAPS: u32 = 4u;
 const BVH_HAS_HOLES: u32 = 8u;
+// Above them the number of the instance's surface.
+const BVH_SURFACE_SHIFT: u32 = 16u;
 
 const BVH_NODE_WORDS: u32 = 5u;
 // No instance, no triangle, not inside an instance.

@@ -16,8 +16,10 @@ struct Hit {
     // Geometric, on the side hit
     normal: vec3f,
     reflectance: vec3f,
+    // The surface hit, 0: none in particular
+    surface: u32,
 }
 
 fn hit_nothing(kind: u32) -> Hit {
-    return Hit(kind, 0.0, vec3f(0.0), vec3f(0.0), vec3f(0.0));
+    return Hit(kind, 0.0, vec3f(0.0), vec3f(0.0), vec3f(0.0), 0u);
 }

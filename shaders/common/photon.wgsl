@@ -21,11 +21,20 @@ struct Photon {
     normal: u32,
     direction: u32,
     reflectance: u32,
-    light: u32,
+    // Bits 0 to 15 the light that the path began at, 16 to 31 the surface, 0: none in particular
+    light_and_surface: u32,
 }
 
 fn photon_emission(cell: u32, boost: f32) -> u32 {
     return (cell << 16u) | (u32(clamp(PHOTON_BOOST_ONE + round(PHOTON_BOOST_STEPS * log2(boost)), 1.0, 255.0)) << 24u);
+}
+
+fn photon_light(light_and_surface: u32) -> u32 {
+    return light_and_surface & 0xffffu;
+}
+
+fn photon_surface(light_and_surface: u32) -> u32 {
+    return light_and_surface >> 16u;
 }
 
 fn photon_cell(state: u32) -> u32 {

@@ -2,10 +2,11 @@
 //   x  distance along the texel's ray, unit frame, f32 bits; 0: nothing is there
 //   y  geometric normal on the side that is seen, octahedral
 //   z  reflectance, 11-11-10
-//   w  bits 0-7 material class, bit 8 the back of a triangle is seen
+//   w  bits 0-7 material class, bit 8 the back of a triangle is seen, bits 16-31 the surface, 0: none in particular
 // The capture functions are what a host calls from its own fragment shader.
 
 const SURFACE_TEXEL_BACK_FACE: u32 = 256u;
+const SURFACE_TEXEL_SURFACE_SHIFT: u32 = 16u;
 // A directional view's rays start this far before the region's centre, unit frame.
 const SURFACE_TEXEL_PARALLEL_START: f32 = 2.0;
 
@@ -26,7 +27,19 @@ fn surface_texel_pack(texel: SurfaceTexel) -> vec4u {
     );
 }
 
-// The texel of a surface point. `eye` is CaptureView::eye: w = 1 a position, w = 0 the direction of parallel rays.
+// The texel on a surface of this number, 1 to 65535: light is spread over the points of a surface, and no others. 0: on none
+// in particular.
+fn surface_texel_on(texel: SurfaceTexel, surface: u32) -> SurfaceTexel {
+    return SurfaceTexel(
+        texel.distance, texel.normal, texel.reflectance, (texel.flags & 0xffffu) | (surface << SURFACE_TEXEL_SURFACE_SHIFT),
+    );
+}
+
+fn surface_texel_surface(texel: SurfaceTexel) -> u32 {
+    return texel.flags >> SURFACE_TEXEL_SURFACE_SHIFT;
+}
+
+// The texel of a surface point, on none in particular. `eye` is CaptureView::eye: w = 1 a position, w = 0 the direction of parallel rays.
 fn surface_texel_at(position: vec3f, normal: vec3f, reflectance: vec3f, eye: vec4f, front_facing: bool) -> SurfaceTexel {
     var ray = eye.xyz;
     var distance = dot(position, eye.xyz) + SURFACE_TEXEL_PARALLEL_START;

@@ -94,6 +94,6 @@ fn emit_photon(index: u32, start: EmissionStart, kept: u32) {
         octahedral_pack(texel.normal),
         octahedral_pack(ray.direction),
         reflectance_pack(texel.reflectance),
-        light_index,
+        light_index | (surface_texel_surface(texel) << 16u),
     );
 }

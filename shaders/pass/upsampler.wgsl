@@ -27,9 +27,10 @@ struct Marking {
 @group(0) @binding(2) var depth_texture: texture_2d<f32>;
 @group(0) @binding(3) var normal_texture: texture_2d<f32>;
 @group(0) @binding(4) var base_color_texture: texture_2d<f32>;
-@group(0) @binding(5) var coarse: texture_2d<f32>;
-@group(0) @binding(6) var irradiance: texture_storage_2d<rgba32float, write>;
-@group(0) @binding(7) var<storage, read_write> marked: Marking;
+@group(0) @binding(5) var surface_texture: texture_2d<u32>;
+@group(0) @binding(6) var coarse: texture_2d<f32>;
+@group(0) @binding(7) var irradiance: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(8) var<storage, read_write> marked: Marking;
 
 // Positions come from f32 depths through an f32 matrix: some ten roundings of 2^-24 of the numbers involved, which are of
 // the order of the region's radius (at most 1) or of the distance to the eye.
@@ -37,6 +38,8 @@ const ROUNDING: f32 = 0x1p-20;
 // Misfits of samples without a surface, and of those whose misfit is no number.
 const UNSEEN: f32 = 3e38;
 const WORST: f32 = 1e38;
+// What a sample of another surface is worse by: taken only where there is none of the pixel's own.
+const OTHER_SURFACE: f32 = 1e6;
 // Where the samples that fit weigh less than this together, of 1, they lie to one side.
 const LEAST_FIT: f32 = 0.25;
 
@@ -51,6 +54,8 @@ struct Receiver {
     w: f32,
     // Width of a pixel at its distance
     pixel_width: f32,
+    // Number of its surface, 0: none in particular
+    surface: u32,
 }
 
 // What a sample says, and how well it fits a receiver.
@@ -88,6 +93,10 @@ fn shading_normal_at(pixel: vec2u) -> vec3f {
     return g_buffer_normal(view, textureLoad(normal_texture, pixel + view.origin, 0));
 }
 
+fn surface_at(pixel: vec2u) -> u32 {
+    return textureLoad(surface_texture, pixel + view.origin, 0).r;
+}
+
 fn is_surface(pixel: vec2u) -> bool {
     return textureLoad(base_color_texture, pixel + view.origin, 0).a > 0.0;
 }
@@ -104,7 +113,7 @@ fn receiver_at(pixel: vec2u) -> Receiver {
     );
     let normal = g_buffer_geometric_normal(view, vec2i(pixel), p, around, shading);
     let w = dot(g_buffer_row(view, 3u), vec4f(p, 1.0));
-    return Receiver(pixel, p, shading, normal, w, w / g_buffer_pixels_a_length(view));
+    return Receiver(pixel, p, shading, normal, w, w / g_buffer_pixels_a_length(view), surface_at(pixel));
 }
 
 // The sample of this index as the receiver sees it.
@@ -123,10 +132,12 @@ fn sample_for(receiver: Receiver, index: vec2u) -> Sample {
     let apart = p - receiver.position;
     let off_plane = min(abs(dot(apart, receiver.normal)), abs(dot(apart, receiver.shading)));
     let lifted = off_plane / (params.plane_distance * distance + ROUNDING * (1.0 + receiver.w));
-    let misfit = turned + lifted;
+    let surface = surface_at(pixel);
+    let is_other = surface != receiver.surface && surface != 0u && receiver.surface != 0u;
+    let misfit = turned + lifted + select(0.0, OTHER_SURFACE, is_other);
     // What is linear on a plane in space is linear on the screen only over w: weights of 1 / w interpolate it exactly.
     let perspective = receiver.w / dot(g_buffer_row(view, 3u), vec4f(p, 1.0));
-    let fit = perspective * max(0.0, 1.0 - turned) * max(0.0, 1.0 - lifted);
+    let fit = select(perspective * max(0.0, 1.0 - turned) * max(0.0, 1.0 - lifted), 0.0, is_other);
     return Sample(textureLoad(coarse, index, 0).rgb, fit, select(WORST, misfit, misfit < WORST));
 }
 

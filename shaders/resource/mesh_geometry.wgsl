@@ -10,6 +10,7 @@ struct Instance {
     normal_transform: mat3x3f,
     material: u32,
     mirrored: u32,
+    surface: u32,
 }
 
 struct Material {
@@ -74,13 +75,14 @@ fn fragment_surface(v: Vertex, @builtin(front_facing) front_facing: bool) -> @lo
     let texel = surface_texel_at(
         v.position, surface.geometric_normal, surface.base_color.rgb, view.eye, surface.front_facing,
     );
-    return surface_texel_pack(texel);
+    return surface_texel_pack(surface_texel_on(texel, instances[v.instance].surface));
 }
 
 struct GBufferTexel {
-    @location(0) normal: vec4f,
+    @location(0) normal: vec2f,
     @location(1) base_color: vec4f,
     @location(2) emission: vec4f,
+    @location(3) surface: u32,
 }
 
 @fragment
@@ -97,5 +99,10 @@ fn fragment_g_buffer(v: Vertex, @builtin(front_facing) front_facing: bool) -> GB
     let front = normalize(select(geometric, v.normal, has_normal));
     let shading = select(front, -front, has_normal && !surface.front_facing);
     let emission = select(vec3f(0.0), surface.emission, surface.front_facing);
-    return GBufferTexel(vec4f(shading, 0.0), vec4f(surface.base_color.rgb, 1.0), vec4f(emission, 1.0));
+    return GBufferTexel(
+        octahedral_encode(shading),
+        vec4f(surface.base_color.rgb, 1.0),
+        vec4f(emission, 1.0),
+        instances[v.instance].surface,
+    );
 }

@@ -439,6 +439,12 @@ const KNOBS: &[Knob] = &[
         ["cone", Kernel::Cone],
         ["epanechnikov", Kernel::Epanechnikov]
     ),
+    field!(
+        "splatter.keeps_to_surfaces",
+        "true or false",
+        splatter_config.keeps_to_surfaces,
+        |_| true
+    ),
     Knob {
         name: "splatter.photons",
         expected: "above 0: photons under a kernel",

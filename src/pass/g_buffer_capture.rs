@@ -39,7 +39,7 @@ impl GBufferCapture {
     ) {
         g_buffer.set_view(inputs.queue, inputs.view);
         let views = g_buffer.views();
-        let colors = [&views.normal, &views.base_color, &views.emission];
+        let colors = [&views.normal, &views.base_color, &views.emission, g_buffer.surfaces()];
         let label = "lightfall::GBufferCapture";
         let mut pass = gpu::render_pass(encoder, label, &colors, Some(&views.depth), inputs.timestamps);
         inputs.geometry.draw(&mut pass, &inputs.view.capture);

@@ -10,7 +10,8 @@
 //! weigh less than a quarter of what four do, and where none fits.
 //!
 //! A sample weighs as in bilinear interpolation, times how well its normal agrees, times how near it lies to the
-//! receiver's tangent plane, by geometric or shading normal. That plane stands for the paper's difference of depth, which
+//! receiver's tangent plane, by geometric or shading normal; of another surface than the pixel's, by their numbers, it does not
+//! count at all. That plane stands for the paper's difference of depth, which
 //! a slanted floor has by itself.
 //! Distance from it is measured in distances on the screen between receiver and sample, brought to the receiver's depth,
 //! so that scale and angle of view play no part. Weights are over clip-space w: what is linear on a plane is reproduced
@@ -45,12 +46,13 @@ pub(crate) mod gpu {
 }
 
 /// Bindings of `shaders/pass/upsampler.wgsl`, in order.
-pub(crate) const SLOTS: [Slot; 8] = [
+pub(crate) const SLOTS: [Slot; 9] = [
     Slot::Uniform,
     Slot::Uniform,
     Slot::Texture,
     Slot::Texture,
     Slot::Texture,
+    Slot::UintTexture,
     Slot::Texture,
     Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
     Slot::StorageMut,
@@ -179,6 +181,7 @@ impl Upsampler {
             (&views.depth).into(),
             (&views.normal).into(),
             (&views.base_color).into(),
+            inputs.g_buffer.surfaces().into(),
             inputs.coarse.view().into(),
             inputs.irradiance.view().into(),
             marked.map_or(&resources.no_marks, MarkedPixels::buffer).into(),

@@ -27,6 +27,7 @@ pub(crate) mod gpu {
         pub(crate) root: u32,
         pub(crate) first_triangle: u32,
         pub(crate) material: u32,
+        /// Bits 16 to 31: the surface.
         pub(crate) mask: u32,
         /// Of the leaf with the number of this record: which record it means.
         pub(crate) leaf: u32,
@@ -67,6 +68,9 @@ pub(crate) const ALL: u32 = 1;
 pub(crate) const CASTS_SHADOW: u32 = 2;
 pub(crate) const IN_ENV_MAPS: u32 = 4;
 pub(crate) const HAS_HOLES: u32 = 8;
+
+/// Above them the number of the instance's surface. Twin of `BVH_SURFACE_SHIFT`.
+pub(crate) const SURFACE_SHIFT: u32 = 16;
 
 /// Speed and memory against accuracy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -378,7 +382,7 @@ impl BvhGeometry {
             root: place.first_node,
             first_triangle: place.first_triangle,
             material: instance.material as u32,
-            mask: mask.iter().filter(|m| m.0).map(|m| m.1).sum(),
+            mask: mask.iter().filter(|m| m.0).map(|m| m.1).sum::<u32>() | u32::from(instance.surface) << SURFACE_SHIFT,
             leaf: 0,
         };
         let is_invertible = to_mesh.is_finite() && record.to_mesh.iter().flatten().all(|x| x.is_finite());

@@ -50,6 +50,9 @@ pub struct GBufferViews {
     /// Emitted radiance towards the viewer, unit frame, RGB. Hosts without emission give a black texture of one texel:
     /// what lies outside it reads as black.
     pub emission: wgpu::TextureView,
+    /// The number of the surface that is seen, 1 to 65 535, and 0 for none in particular: see
+    /// [`Instance::surface`](crate::scene::Instance::surface). In the first channel; `None`: there are no numbers.
+    pub surfaces: Option<wgpu::TextureView>,
     /// The part in use (x, y, width, height), for dynamic resolution; `None`: all of it.
     pub rectangle: Option<[u32; 4]>,
 }
@@ -59,6 +62,8 @@ pub struct GBufferViews {
 #[derive(Debug)]
 pub struct GBuffer {
     views: GBufferViews,
+    /// Of zeros, bound where the host has no numbers.
+    no_surfaces: Option<wgpu::TextureView>,
     view_buffer: wgpu::Buffer,
     written: Option<CameraView>,
     size: [u32; 2],
@@ -73,7 +78,8 @@ impl GBuffer {
         colors + device::texture_bytes(size, 1, targets.depth) + size_of::<gpu::ViewUniform>() as u64
     }
 
-    /// Textures of the crate's own layout: `depth32float`, normal and base colour `rgba16float`, emission `rgba32float`.
+    /// Textures of the crate's own layout: `depth32float`, octahedral normal `rg16float`, base colour `rgba16float`, emission
+    /// `rgba32float`, surfaces `r32uint`.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`].
@@ -94,9 +100,10 @@ impl GBuffer {
         let views = GBufferViews {
             depth: make("lightfall::GBuffer::depth", targets.depth)?,
             normal: make("lightfall::GBuffer::normal", targets.colors[0])?,
-            normal_encoding: NormalEncoding::Signed,
+            normal_encoding: NormalEncoding::Octahedral,
             base_color: make("lightfall::GBuffer::base_color", targets.colors[1])?,
             emission: make("lightfall::GBuffer::emission", targets.colors[2])?,
+            surfaces: Some(make("lightfall::GBuffer::surfaces", targets.colors[3])?),
             rectangle: None,
         };
         Self::with_views(gpu, views, size, Self::size_in_bytes(size))
@@ -127,6 +134,14 @@ impl GBuffer {
             F::Bgra8UnormSrgb,
         ];
         let emission_formats = [F::Rgba16Float, F::Rgba32Float, F::Rgba8Unorm, F::Rg11b10Ufloat];
+        let surface_formats = [
+            F::R32Uint,
+            F::R16Uint,
+            F::R8Uint,
+            F::Rg32Uint,
+            F::Rg16Uint,
+            F::Rgba16Uint,
+        ];
         let usage = wgpu::TextureUsages::TEXTURE_BINDING;
         expect_view("G-buffer depth", &views.depth, &depth_formats, usage)?;
         expect_view("G-buffer normal", &views.normal, &normal_formats, usage)?;
@@ -137,6 +152,10 @@ impl GBuffer {
         expect("G-buffer normal", "size", extent(&views.normal), &[full])?;
         expect("G-buffer base colour", "size", extent(&views.base_color), &[full])?;
         expect("G-buffer emission", "size", extent(&views.emission), &[full, [1, 1]])?;
+        if let Some(surfaces) = &views.surfaces {
+            expect_view("G-buffer surfaces", surfaces, &surface_formats, usage)?;
+            expect("G-buffer surfaces", "size", extent(surfaces), &[full])?;
+        }
         let [x, y, width, height] = views.rectangle.unwrap_or([0, 0, full[0], full[1]]);
         let fits =
             |start: u32, length: u32, limit: u32| length > 0 && start.checked_add(length).is_some_and(|e| e <= limit);
@@ -148,12 +167,24 @@ impl GBuffer {
                 found: format!("{width}×{height} at ({x}, {y})"),
             });
         }
-        let bytes = size_of::<gpu::ViewUniform>() as u64;
+        let no_surfaces = u64::from(views.surfaces.is_none()) * device::texture_bytes([1; 2], 1, F::R32Uint);
+        let bytes = size_of::<gpu::ViewUniform>() as u64 + no_surfaces;
         Self::with_views(gpu, views, [width, height], bytes)
     }
 
     fn with_views(gpu: &wgpu::Device, views: GBufferViews, size: [u32; 2], bytes: u64) -> Result<Self, Error> {
+        let no_surfaces = || {
+            let spec = device::TextureSpec {
+                label: "lightfall::GBuffer::no_surfaces",
+                size: [1; 2],
+                layers: 1,
+                format: wgpu::TextureFormat::R32Uint,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            };
+            Ok(device::texture(gpu, &spec)?.create_view(&Default::default()))
+        };
         Ok(Self {
+            no_surfaces: views.surfaces.is_none().then(no_surfaces).transpose()?,
             views,
             view_buffer: device::uniform_buffer::<gpu::ViewUniform>(gpu, "lightfall::GBuffer::view")?,
             written: None,
@@ -185,6 +216,12 @@ impl GBuffer {
     /// The textures.
     pub fn views(&self) -> &GBufferViews {
         &self.views
+    }
+
+    /// What passes bind for the numbers of surfaces: the host's, or one texel of zero, outside of which reads are zero too.
+    pub(crate) fn surfaces(&self) -> &wgpu::TextureView {
+        let own = self.views.surfaces.as_ref().or(self.no_surfaces.as_ref());
+        own.expect("made where the host has none")
     }
 
     /// The view's matrices, as `View` of `shaders/common/g_buffer.wgsl`.

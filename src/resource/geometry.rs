@@ -45,13 +45,14 @@ impl CaptureTargets {
     /// Targets of views of this purpose.
     ///
     /// Lights, candidates and environment maps: one `rgba32uint`, written with `surface_texel_pack` of
-    /// [`wgsl::CAPTURE`](crate::wgsl::CAPTURE). The camera: normal, base colour and emission as
-    /// [`GBuffer`](super::GBuffer) describes.
+    /// [`wgsl::CAPTURE`](crate::wgsl::CAPTURE). The camera: octahedral normal (`vec2f`, what `octahedral_encode` makes of it),
+    /// base colour (`vec4f`, alpha 1), emission (`vec4f`) and the number of the surface (`u32`), as
+    /// [`GBufferViews`](super::GBufferViews) describes them.
     pub fn of(purpose: CapturePurpose) -> Self {
         use wgpu::TextureFormat as F;
         Self {
             colors: match purpose {
-                CapturePurpose::Camera => &[F::Rgba16Float, F::Rgba16Float, F::Rgba32Float],
+                CapturePurpose::Camera => &[F::Rg16Float, F::Rgba16Float, F::Rgba32Float, F::R32Uint],
                 _ => &[F::Rgba32Uint],
             },
             depth: F::Depth32Float,

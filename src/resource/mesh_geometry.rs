@@ -26,7 +26,8 @@ pub(crate) mod gpu {
         pub(crate) normal_transform: [[f32; 4]; 3],
         pub(crate) material: u32,
         pub(crate) mirrored: u32,
-        pub(crate) _pad: [u32; 2],
+        pub(crate) surface: u32,
+        pub(crate) _pad: u32,
     }
 
     /// Twin of `Material`.
@@ -335,7 +336,8 @@ fn instance_record(context: &PrepareContext<'_>, instance: &Instance) -> gpu::Me
             .map(|c| (c * scale).extend(0.0).to_array()),
         material: instance.material as u32,
         mirrored: u32::from(mirrored),
-        _pad: [0; 2],
+        surface: u32::from(instance.surface),
+        _pad: 0,
     }
 }
 

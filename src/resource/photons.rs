@@ -29,8 +29,9 @@ pub struct Photon {
     pub direction: u32,
     /// Reflectance of the surface, 11-11-10.
     pub reflectance: u32,
-    /// Index of the light the path began at, among the punctual ones.
-    pub light: u32,
+    /// Bits 0 to 15: index of the light that the path began at, among the punctual ones. Bits 16 to 31:
+    /// [`Instance::surface`](crate::scene::Instance::surface) of what was hit, 0 where it has none.
+    pub light_and_surface: u32,
 }
 
 /// What became of a hop.
@@ -89,6 +90,16 @@ impl Photon {
     pub fn pack_reflectance(rgb: [f32; 3]) -> u32 {
         let steps = |value: f32, most: f32| (value.clamp(0.0, 1.0) * most).round() as u32;
         steps(rgb[0], 2047.0) | steps(rgb[1], 2047.0) << 11 | steps(rgb[2], 1023.0) << 22
+    }
+
+    /// Index of the light that the path began at, among the punctual ones.
+    pub fn light(&self) -> u32 {
+        self.light_and_surface & 0xffff
+    }
+
+    /// The surface that it arrived at; 0: none in particular.
+    pub fn surface(&self) -> u16 {
+        (self.light_and_surface >> 16) as u16
     }
 
     /// How many times as densely photons start where this one's path did as if they were spread evenly, within 2.2 %.

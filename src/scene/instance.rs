@@ -19,6 +19,11 @@ pub struct Instance {
     pub in_env_maps: bool,
     /// Whether it blocks direct light.
     pub casts_shadow: bool,
+    /// Which surface it is part of, by a number of the host's from 1: light that arrives there is spread over instances of the
+    /// same number and no others, if [`PhotonSplatterConfig::keeps_to_surfaces`](crate::pass::PhotonSplatterConfig) says so,
+    /// however near they lie and whatever their normals. 0: no surface in particular, which takes light from all and gives to
+    /// all (Larsen 2004, chapter 8).
+    pub surface: u16,
 }
 
 impl Instance {
@@ -31,6 +36,7 @@ impl Instance {
             transform: DAffine3::IDENTITY,
             in_env_maps: true,
             casts_shadow: true,
+            surface: 0,
         }
     }
 

@@ -1,8 +1,8 @@
 //! The engine's draws for lightfall: [`Geometry`], with shaders and bind groups of the engine's own. The library
 //! supplies the views, the targets, and the WGSL functions that turn a surface into a texel.
 
-use super::{Engine, FRAME, Layouts, OBJECT, UNIFORM_STRIDE, Vertex, buffer_group, pipeline, uniform_buffer};
-use lightfall::resource::{CapturePurpose, CaptureTargets, CaptureView, Geometry, PrepareContext};
+use super::{Engine, FRAME, Layouts, Normals, OBJECT, UNIFORM_STRIDE, Vertex, buffer_group, pipeline, uniform_buffer};
+use lightfall::resource::{CapturePurpose, CaptureTargets, CaptureView, Geometry, NormalEncoding, PrepareContext};
 use lightfall::{Error, wgpu, wgsl};
 
 /// Frame, object and material are bound as ever; where the camera stands in other passes, a capture has its view.
@@ -110,5 +110,15 @@ impl Geometry for Engine {
         pass.set_pipeline(&self.capture.pipeline);
         pass.set_bind_group(1, &self.capture.group, &[view.index * UNIFORM_STRIDE]);
         self.draw_objects(pass);
+    }
+}
+
+impl From<Normals> for NormalEncoding {
+    fn from(normals: Normals) -> Self {
+        match normals {
+            Normals::Signed => Self::Signed,
+            Normals::HalfOffset => Self::HalfOffset,
+            Normals::Octahedral => Self::Octahedral,
+        }
     }
 }

@@ -9,5 +9,6 @@ fn trace_ray(position: vec3f, normal: vec3f, direction: vec3f) -> Hit {
     let surface = bvh_surface(met);
     let is_back = dot(surface.geometric_normal, direction) > 0.0;
     let side = select(surface.geometric_normal, -surface.geometric_normal, is_back);
-    return Hit(HIT_SURFACE, met.distance, surface.position, side, bvh_base_color(surface));
+    let number = bvh_instances[met.instance].mask >> BVH_SURFACE_SHIFT;
+    return Hit(HIT_SURFACE, met.distance, surface.position, side, bvh_base_color(surface), number);
 }

@@ -31,10 +31,11 @@ fn count_visible(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let photon = photons[slot];
-    if photon.light >= params.light_count {
+    let light = photon_light(photon.light_and_surface);
+    if light >= params.light_count {
         return;
     }
-    let cell = 2u * (photon.light * CELLS + photon_cell(photon.state));
+    let cell = 2u * (light * CELLS + photon_cell(photon.state));
     if slot < params.path_count {
         if (photon.state & PHOTON_STATE_MASK) != PHOTON_EMPTY {
             atomicAdd(&counts[cell], 1u);

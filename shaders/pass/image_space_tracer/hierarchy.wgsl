@@ -254,7 +254,7 @@ fn hierarchy_map(map: u32, x: vec3f, r: vec3f, start: f32, end: f32, starts_in_f
 }
 
 fn hierarchy_hit(surface: SurfaceTexel, x: vec3f, r: vec3f, t: f32) -> Hit {
-    return Hit(HIT_SURFACE, t, x + t * r, surface.normal, surface.reflectance);
+    return Hit(HIT_SURFACE, t, x + t * r, surface.normal, surface.reflectance, surface_texel_surface(surface));
 }
 
 // The ray comes out through a surface from behind, or close behind its rim: through whatever body that surface belongs to.

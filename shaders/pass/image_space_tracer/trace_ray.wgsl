@@ -89,7 +89,7 @@ fn trace_accept_plane(texel: EnvMapTexel, x: vec3f, r: vec3f) -> Hit {
     if max(away.x, away.y) > TRACE_FOOTPRINT {
         return hit_nothing(HIT_LOST);
     }
-    return Hit(HIT_SURFACE, distance, p, n, texel.surface.reflectance);
+    return Hit(HIT_SURFACE, distance, p, n, texel.surface.reflectance, surface_texel_surface(texel.surface));
 }
 
 // Whether a map sees a surface point from its front: then the ray starts in space that the map knows.

@@ -10,6 +10,14 @@ const BOUNDARY_GOLDEN_ANGLE: f32 = 2.399963230;
 // No kernel counts for less than this: in the tip of a corner of 30 degrees a twelfth of it is on the surface.
 const BOUNDARY_LEAST: f32 = 0.08;
 
+// Number of the surface at a texel of the G-buffer.
+fn boundary_surface(at: vec2u) -> u32 {
+    if splat_keeps_to_surfaces {
+        return textureLoad(surface_texture, at, 0).r;
+    }
+    return 0u;
+}
+
 // Whether the receiver's surface goes on at y, a point of its tangent plane, as far as the image tells. What it does not show
 // is taken to go on.
 fn boundary_goes_on(receiver: Receiver, y: vec3f, slab: f32) -> bool {
@@ -29,7 +37,7 @@ fn boundary_goes_on(receiver: Receiver, y: vec3f, slab: f32) -> bool {
     let normal = g_buffer_normal(view, textureLoad(normal_texture, at, 0));
     let off_plane = dot(seen - receiver.position, receiver.normal);
     if abs(off_plane) <= slab && dot(normal, receiver.normal) >= SPLAT_NORMAL_AGREEMENT {
-        return true;
+        return splat_shares(receiver.surface, boundary_surface(at));
     }
     let ray = seen - view.eye.xyz * view.eye.w;
     let to_seen = select(view.eye.xyz, ray, view.eye.w > 0.0);

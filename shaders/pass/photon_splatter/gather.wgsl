@@ -1,4 +1,4 @@
-// Adding up photons, for as many receivers at once as `Receivers` holds. The module brings `params.bandwidth` and the sorted
+// Adding up photons, for as many receivers at once as `Receivers` and `Surfaces` hold. The module brings `params.bandwidth` and the sorted
 // photons: `splats`, `first_splats`, `reach`.
 
 // Receivers by coordinate, and what they have gathered.
@@ -9,6 +9,7 @@ struct Gathered {
     normal_x: Receivers,
     normal_y: Receivers,
     normal_z: Receivers,
+    surface: Surfaces,
     red: Receivers,
     green: Receivers,
     blue: Receivers,
@@ -22,12 +23,18 @@ fn gather_splat(g: ptr<function, Gathered>, index: u32, last: u32) {
     let dx = (*g).x - splat.position.x;
     let dy = (*g).y - splat.position.y;
     let dz = (*g).z - splat.position.z;
-    let q = (dx * dx + dy * dy + dz * dz) * splat.inverse_radius_squared;
+    let inverse = splat_inverse(splat);
+    let q = (dx * dx + dy * dy + dz * dz) * inverse;
     let off_plane = abs(dx * n.x + dy * n.y + dz * n.z);
     let agreement = (*g).normal_x * n.x + (*g).normal_y * n.y + (*g).normal_z * n.z;
-    let radius = inverseSqrt(splat.inverse_radius_squared);
+    let radius = inverseSqrt(inverse);
     let is_one = f32(index <= last);
-    let weight = is_one * splat_weight(q, off_plane, agreement, splat_slab(radius));
+    var weight = is_one * splat_weight(q, off_plane, agreement, splat_slab(radius));
+    if splat_keeps_to_surfaces {
+        let own = Surfaces(splat.inverse_radius_squared & SPLAT_SURFACE_BITS);
+        let is_shared = (own == (*g).surface) | (own == Surfaces(0u)) | ((*g).surface == Surfaces(0u));
+        weight = select(Receivers(0.0), weight, is_shared);
+    }
     let strength = splat.strength;
     (*g).red += strength.x * weight;
     (*g).green += strength.y * weight;

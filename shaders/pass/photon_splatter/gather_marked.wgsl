@@ -17,10 +17,12 @@ struct MarkedParams {
 @group(0) @binding(5) var depth_texture: texture_2d<f32>;
 @group(0) @binding(6) var normal_texture: texture_2d<f32>;
 @group(0) @binding(7) var base_color_texture: texture_2d<f32>;
-@group(0) @binding(8) var<storage, read> marked: MarkedPixels;
-@group(0) @binding(9) var irradiance: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(8) var surface_texture: texture_2d<u32>;
+@group(0) @binding(9) var<storage, read> marked: MarkedPixels;
+@group(0) @binding(10) var irradiance: texture_storage_2d<rgba32float, write>;
 
 alias Receivers = f32;
+alias Surfaces = u32;
 
 @compute @workgroup_size(64)
 fn gather_marked(
@@ -42,6 +44,7 @@ fn gather_marked(
     g.normal_x = seen.normal.x;
     g.normal_y = seen.normal.y;
     g.normal_z = seen.normal.z;
+    g.surface = seen.surface;
     // Among the pixels that photons were sorted for.
     let place = irradiance_place(params.bandwidth, vec2f(full) + 0.5);
     gather_photons(&g, place, place);

@@ -12,6 +12,7 @@
 const TILE: u32 = 16u;
 
 alias Receivers = vec4f;
+alias Surfaces = vec4u;
 
 // Nothing gathered yet. Indices are constants here and in `gather_sums`: what is indexed otherwise lives in memory.
 fn gather_start(r: array<Receiver, 4>) -> Gathered {
@@ -24,6 +25,7 @@ fn gather_start(r: array<Receiver, 4>) -> Gathered {
     g.normal_x = seen * vec4f(r[0].normal.x, r[1].normal.x, r[2].normal.x, r[3].normal.x);
     g.normal_y = seen * vec4f(r[0].normal.y, r[1].normal.y, r[2].normal.y, r[3].normal.y);
     g.normal_z = seen * vec4f(r[0].normal.z, r[1].normal.z, r[2].normal.z, r[3].normal.z);
+    g.surface = vec4u(r[0].surface, r[1].surface, r[2].surface, r[3].surface);
     return g;
 }
 
@@ -50,7 +52,7 @@ fn gather_tiles(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_i
     var seen: array<Receiver, 4>;
     for (var i = 0u; i < 4u; i++) {
         let pixel = min(own + vec2u(i % 2u, i / 2u), size - 1u);
-        seen[i] = receiver_unpack(textureLoad(receivers, pixel, 0));
+        seen[i] = receiver_unpack(textureLoad(receivers, pixel, 0), subsampling_pixel(pixel, b.factor, view.size));
     }
     var g = gather_start(seen);
     // Where they stand: the last ones of an axis may stand closer than one pixel of the irradiance.

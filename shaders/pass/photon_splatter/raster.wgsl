@@ -12,6 +12,7 @@ struct Corner {
     @location(1) @interpolate(flat) radius: f32,
     @location(2) @interpolate(flat) flux: vec3f,
     @location(3) @interpolate(flat) normal: vec3f,
+    @location(4) @interpolate(flat) surface: u32,
 }
 
 fn bin_count(bin: u32) -> u32 {
@@ -24,20 +25,22 @@ fn raster_corner(photon: Photon, radius: f32, normal: vec3f, offset: vec3f) -> C
     clip = vec4f(params.clip_scale * clip.xy + params.clip_shift * clip.w, clip.zw);
     // The near plane must not cut a shape whose receivers it cannot cut.
     clip.z = 0.5 * clip.w;
-    return Corner(clip, photon.position, radius, photon.flux, normal);
+    return Corner(clip, photon.position, radius, photon.flux, normal, photon_surface(photon.light_and_surface));
 }
 
 // All corners of a shape in one point: nothing is drawn.
 fn raster_nothing() -> Corner {
-    return Corner(vec4f(0.0, 0.0, 0.0, 1.0), vec3f(0.0), 1.0, vec3f(0.0), vec3f(0.0, 0.0, 1.0));
+    return Corner(vec4f(0.0, 0.0, 0.0, 1.0), vec3f(0.0), 1.0, vec3f(0.0), vec3f(0.0, 0.0, 1.0), 0u);
 }
 
 alias Receivers = f32;
 
 @fragment
 fn fragment(corner: Corner) -> @location(0) vec4f {
-    let receiver = receiver_unpack(textureLoad(receivers, vec2u(corner.clip.xy), 0));
-    if !receiver.is_seen {
+    let at = vec2u(corner.clip.xy);
+    let pixel = subsampling_pixel(at, params.bandwidth.factor, view.size);
+    let receiver = receiver_unpack(textureLoad(receivers, at, 0), pixel);
+    if !receiver.is_seen || !splat_shares(receiver.surface, corner.surface) {
         discard;
     }
     let d = receiver.position - corner.position;

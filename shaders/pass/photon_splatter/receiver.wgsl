@@ -1,20 +1,27 @@
-// A point that irradiance is estimated at, as one texel: the bits of its position in the unit frame, and its geometric
-// normal, octahedral.
+// A point that irradiance is estimated at, as one texel: the bits of its depth, its geometric normal, octahedral, and the
+// number of its surface. The module brings `view`.
 
 struct Receiver {
     position: vec3f,
     normal: vec3f,
+    // 0: none in particular
+    surface: u32,
     is_seen: bool,
 }
 
-// No normal packs to this.
-const RECEIVER_NOWHERE: u32 = 0x80008000u;
-
-fn receiver_pack(receiver: Receiver) -> vec4u {
-    let normal = select(RECEIVER_NOWHERE, octahedral_pack(receiver.normal), receiver.is_seen);
-    return vec4u(bitcast<vec3u>(receiver.position), normal);
+fn receiver_nowhere() -> Receiver {
+    return Receiver(vec3f(0.0), vec3f(0.0), 0u, false);
 }
 
-fn receiver_unpack(texel: vec4u) -> Receiver {
-    return Receiver(bitcast<vec3f>(texel.xyz), octahedral_unpack(texel.w), texel.w != RECEIVER_NOWHERE);
+fn receiver_pack(receiver: Receiver, depth: f32) -> vec4u {
+    return vec4u(bitcast<u32>(depth), octahedral_pack(receiver.normal), receiver.surface, u32(receiver.is_seen));
+}
+
+// `pixel` of the G-buffer that the texel was made at.
+fn receiver_unpack(texel: vec4u, pixel: vec2u) -> Receiver {
+    if texel.w == 0u {
+        return receiver_nowhere();
+    }
+    let position = g_buffer_position(view, vec2f(pixel), bitcast<f32>(texel.x));
+    return Receiver(position, octahedral_unpack(texel.y), texel.z, true);
 }

@@ -1,14 +1,17 @@
 // The surface point that a pixel of the G-buffer shows. The module brings `view` and the textures.
 
+fn receiver_depth(pixel: vec2u) -> f32 {
+    return textureLoad(depth_texture, pixel + view.origin, 0).r;
+}
+
 fn receiver_position(pixel: vec2i) -> vec3f {
-    let at = vec2u(pixel) + view.origin;
-    return g_buffer_position(view, vec2f(pixel), textureLoad(depth_texture, at, 0).r);
+    return g_buffer_position(view, vec2f(pixel), receiver_depth(vec2u(pixel)));
 }
 
 fn receiver_at(pixel: vec2u) -> Receiver {
     let at = pixel + view.origin;
     if textureLoad(base_color_texture, at, 0).a <= 0.0 {
-        return Receiver(vec3f(0.0), vec3f(0.0), false);
+        return receiver_nowhere();
     }
     let p = vec2i(pixel);
     let position = receiver_position(p);
@@ -20,5 +23,6 @@ fn receiver_at(pixel: vec2u) -> Receiver {
         receiver_position(vec2i(p.x, min(p.y + 1, limit.y))),
     );
     let shading = g_buffer_normal(view, textureLoad(normal_texture, at, 0));
-    return Receiver(position, g_buffer_geometric_normal(view, p, position, around, shading), true);
+    let normal = g_buffer_geometric_normal(view, p, position, around, shading);
+    return Receiver(position, normal, textureLoad(surface_texture, at, 0).r, true);
 }

@@ -127,8 +127,16 @@ fn prepare_splats(@builtin(global_invocation_id) id: vec3u) {
         splats[index] = splat_nothing();
         return;
     }
-    let inverse = 1.0 / (h * h);
-    splats[index] = Splat(photon.position, inverse, photon.flux * inverse, photon.normal);
+    var bits = bitcast<u32>(1.0 / (h * h));
+    if splat_keeps_to_surfaces {
+        // Radii of eight digits, rounded down; flux is spread over what they are then.
+        bits = (bits + SPLAT_SURFACE_BITS) & ~SPLAT_SURFACE_BITS;
+    }
+    let inverse = bitcast<f32>(bits);
+    if splat_keeps_to_surfaces {
+        bits |= photon_surface(photon.light_and_surface);
+    }
+    splats[index] = Splat(photon.position, bits, photon.flux * inverse, photon.normal);
     // A step of slack for rounding.
     let steps = u32(ceil(f32(REACH_STEPS) * beyond)) + 1u;
     atomicMax(&reach[keys[index]], steps);

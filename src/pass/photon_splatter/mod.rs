@@ -14,6 +14,8 @@ pub(crate) mod sort;
 pub(crate) mod tiled;
 
 use crate::gpu::{self as device, BindGroupCache, Bound, ComputeSpec, Slot, TextureSpec};
+#[cfg(doc)]
+use crate::resource::GBufferViews;
 use crate::resource::{GBuffer, Irradiance, MarkedPixels, PHOTON_BYTES, Photons, Subsampling};
 use crate::{Error, Timestamps, wgsl};
 use raster::{Raster, RasterBuffers};
@@ -54,22 +56,24 @@ pub(crate) mod gpu {
 }
 
 /// Bindings of `shaders/pass/photon_splatter/find_receivers.wgsl`, in order.
-pub(crate) const RECEIVER_SLOTS: [Slot; 6] = [
+pub(crate) const RECEIVER_SLOTS: [Slot; 7] = [
     Slot::Uniform,
     Slot::Uniform,
     Slot::Texture,
     Slot::Texture,
     Slot::Texture,
+    Slot::UintTexture,
     Slot::StorageTexture(RECEIVER_FORMAT),
 ];
 
 /// Bindings of `shaders/pass/photon_splatter/finish.wgsl`, in order.
-pub(crate) const FINISH_SLOTS: [Slot; 8] = [
+pub(crate) const FINISH_SLOTS: [Slot; 9] = [
     Slot::Uniform,
     Slot::Uniform,
     Slot::Texture,
     Slot::Texture,
     Slot::Texture,
+    Slot::UintTexture,
     Slot::UintTexture,
     Slot::Texture,
     Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
@@ -161,6 +165,10 @@ pub struct PhotonSplatterConfig {
     /// Format that quads and volumes are blended in, one of [`Irradiance::FORMATS`]; `None`: `rgba16float`. Tiles add up in
     /// f32 always.
     pub blend_format: Option<wgpu::TextureFormat>,
+    /// Whether a photon brightens only the surface that it arrived at, where both that and the receiver's have a number
+    /// ([`Instance::surface`](crate::scene::Instance::surface), [`GBufferViews::surfaces`]): for walls thinner than kernels are
+    /// wide, and things that lie flat on others. Of tiles radii are then kept to eight binary digits.
+    pub keeps_to_surfaces: bool,
 }
 
 impl PhotonSplatterConfig {
@@ -348,7 +356,8 @@ impl PhotonSplatter {
                 found: format!("{:?}", config.sum_format()),
             });
         }
-        let kernel = [("kernel", f64::from(config.kernel as u32))];
+        let surfaces = ("splat_keeps_to_surfaces", f64::from(u8::from(config.keeps_to_surfaces)));
+        let kernel = [("kernel", f64::from(config.kernel as u32)), surfaces];
         let step = |label, source, entry_point, constants, slots: &[Slot]| {
             let spec = ComputeSpec {
                 label,
@@ -370,7 +379,7 @@ impl PhotonSplatter {
                 &RECEIVER_SLOTS,
             ),
             shape: match config.shape {
-                SplatShape::Tiled => Shape::Tiled(Box::new(Tiled::new(device, &kernel))),
+                SplatShape::Tiled => Shape::Tiled(Box::new(Tiled::new(device, &kernel, &[surfaces]))),
                 SplatShape::Quads | SplatShape::Volumes => Shape::Raster(Raster::new(device, config, &kernel)),
             },
             finish: step(
@@ -446,12 +455,13 @@ impl PhotonSplatter {
             .queue
             .write_buffer(&resources.receiver_params, 0, bytemuck::bytes_of(&params));
         let views = inputs.g_buffer.views();
-        let bound: [Bound; 6] = [
+        let bound: [Bound; 7] = [
             (&resources.receiver_params).into(),
             inputs.g_buffer.view_buffer().into(),
             (&views.depth).into(),
             (&views.normal).into(),
             (&views.base_color).into(),
+            inputs.g_buffer.surfaces().into(),
             (&resources.receivers).into(),
         ];
         let label = "lightfall::PhotonSplatter::receivers";
@@ -475,12 +485,13 @@ impl PhotonSplatter {
             .queue
             .write_buffer(&resources.finish_params, 0, bytemuck::bytes_of(&params));
         let views = inputs.g_buffer.views();
-        let bound: [Bound; 8] = [
+        let bound: [Bound; 9] = [
             (&resources.finish_params).into(),
             inputs.g_buffer.view_buffer().into(),
             (&views.depth).into(),
             (&views.normal).into(),
             (&views.base_color).into(),
+            inputs.g_buffer.surfaces().into(),
             (&resources.receivers).into(),
             (&resources.sums).into(),
             inputs.irradiance.view().into(),

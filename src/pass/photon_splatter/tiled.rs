@@ -36,7 +36,7 @@ pub(crate) mod gpu {
     #[repr(C)]
     pub(crate) struct Splat {
         pub(crate) position: [f32; 3],
-        pub(crate) inverse_radius_squared: f32,
+        pub(crate) inverse_radius_squared: u32,
         pub(crate) strength: [f32; 3],
         pub(crate) normal: u32,
     }
@@ -66,7 +66,7 @@ pub(crate) const GATHER_SLOTS: [Slot; 7] = [
 ];
 
 /// Bindings of `shaders/pass/photon_splatter/gather_marked.wgsl`, in order.
-pub(crate) const MARKED_SLOTS: [Slot; 10] = [
+pub(crate) const MARKED_SLOTS: [Slot; 11] = [
     Slot::Uniform,
     Slot::Uniform,
     Slot::Storage,
@@ -75,6 +75,7 @@ pub(crate) const MARKED_SLOTS: [Slot; 10] = [
     Slot::Texture,
     Slot::Texture,
     Slot::Texture,
+    Slot::UintTexture,
     Slot::Storage,
     Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
 ];
@@ -126,7 +127,8 @@ struct MarkedBuffers {
 }
 
 impl Tiled {
-    pub(super) fn new(device: &wgpu::Device, kernel: &[(&str, f64)]) -> Self {
+    /// `kernel`: constants of what weighs photons; `surfaces`: of what prepares them.
+    pub(super) fn new(device: &wgpu::Device, kernel: &[(&str, f64)], surfaces: &[(&str, f64)]) -> Self {
         let label = "lightfall::PhotonSplatter";
         let layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &TILED_SLOTS);
         let gather_layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &GATHER_SLOTS);
@@ -143,7 +145,7 @@ impl Tiled {
                 },
             )
         };
-        let step = |label, entry_point| pipeline(label, wgsl::PHOTON_SPLATTER_TILED, entry_point, &layout, &[]);
+        let step = |label, entry_point| pipeline(label, wgsl::PHOTON_SPLATTER_TILED, entry_point, &layout, surfaces);
         Self {
             find_bins: step("lightfall::PhotonSplatter::find_bins", "find_bins"),
             sort: StableSort::new(device),
@@ -277,6 +279,7 @@ impl Tiled {
             (&views.depth).into(),
             (&views.normal).into(),
             (&views.base_color).into(),
+            inputs.g_buffer.surfaces().into(),
             inputs.marked.buffer().into(),
             inputs.irradiance.view().into(),
         ];
