@@ -31,6 +31,7 @@ pub(crate) const MESH_GEOMETRY: &str = compose![
 pub(crate) const PHOTON_EMITTER: &str = compose![
     "pass/photon_emitter.wgsl",
     "common/emission_cells.wgsl",
+    "common/emission_grid.wgsl",
     "common/light.wgsl",
     "common/photon.wgsl",
     "common/surface_texel.wgsl",
@@ -46,6 +47,7 @@ pub(crate) const PHOTON_EMITTER: &str = compose![
 pub(crate) const EMISSION_IMPORTANCE_COUNT: &str = compose![
     "pass/emission_importance/count_visible.wgsl",
     "pass/emission_importance/params.wgsl",
+    "common/emission_grid.wgsl",
     "common/photon.wgsl",
     "common/g_buffer.wgsl",
     "common/octahedral.wgsl",
@@ -55,6 +57,7 @@ pub(crate) const EMISSION_IMPORTANCE_UPDATE: &str = compose![
     "pass/emission_importance/update_tables.wgsl",
     "pass/emission_importance/params.wgsl",
     "common/emission_cells.wgsl",
+    "common/emission_grid.wgsl",
 ];
 
 pub(crate) const DEPTH_HIERARCHY_BUILD_MEASURE: &str = compose![

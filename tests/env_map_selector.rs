@@ -491,10 +491,12 @@ fn invalid_candidates_are_passed_over_and_a_scene_of_backs_still_gets_maps() {
     }
     let mut bench = Bench::new(&gpu, &inside_out);
     let candidates = bench.candidates(12);
-    let (selection, sights) = bench.select(&candidates, 4, &insatiable());
-    assert!(sights.iter().all(|s| s.back_faces > 0.99 && s.area == 0.0));
-    assert!(!selection.centers.is_empty() && selection.centers.len() <= 4);
-    assert!(selection.coverage.is_finite());
+    for settings in [insatiable(), EnvMapSelectorSettings::default()] {
+        let (selection, sights) = bench.select(&candidates, 4, &settings);
+        assert!(sights.iter().all(|s| s.back_faces > 0.99 && s.area == 0.0));
+        assert_eq!(selection.centers.len(), 4);
+        assert_eq!(selection.coverage, 0.0);
+    }
     assert_no_errors(&gpu);
 }
 

@@ -1,14 +1,11 @@
 // Where a light's photons start: the square of the two random numbers that an emission is made of, in cells, each with the
 // share of the light's photons that start there. The file that uses it binds `emission_tables`, one for each light.
 
-// Cells along each axis. Twin of `CELLS`.
-const EMISSION_CELLS: u32 = 16u;
-
 struct EmissionTable {
     // Sums of shares up to the end of each column of cells
-    columns: array<f32, 16>,
+    columns: array<f32, EMISSION_CELLS>,
     // And, column by column, up to the end of each of its cells, as parts of the column's share
-    rows: array<f32, 256>,
+    rows: array<f32, EMISSION_CELL_TOTAL>,
 }
 
 struct EmissionStart {
@@ -42,8 +39,8 @@ fn emission_start(light: u32, u: vec2f) -> EmissionStart {
     let row_share = emission_tables[light].rows[first + row] - before;
     let y = clamp((u.y - before) / row_share, 0.0, EMISSION_BELOW_ONE);
     let place = (vec2f(f32(column), f32(row)) + vec2f(x, y)) / f32(EMISSION_CELLS);
-    let cells = f32(EMISSION_CELLS * EMISSION_CELLS);
-    return EmissionStart(min(place, vec2f(EMISSION_BELOW_ONE)), first + row, cells * column_share * row_share);
+    let boost = f32(EMISSION_CELL_TOTAL) * column_share * row_share;
+    return EmissionStart(min(place, vec2f(EMISSION_BELOW_ONE)), first + row, boost);
 }
 
 // The largest f32 below 1.

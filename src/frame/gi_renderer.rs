@@ -699,7 +699,7 @@ impl GiRenderer {
                 let importance_inputs = EmissionImportanceInputs {
                     queue: inputs.queue,
                     photons: &scene.photons,
-                    light_count: direct.lights.count(),
+                    lights: &direct.lights,
                     g_buffer: &resources.g_buffer,
                     cells,
                     timestamps: inputs.timestamps,
@@ -930,7 +930,7 @@ impl IndirectView {
             ("splatter", self.splatter.memory_use()),
         ];
         if let Some(importance) = &self.importance {
-            list.push(("emission_cells", importance.memory_use()));
+            list.push(("emission_importance", importance.memory_use()));
         }
         if !self.levels.is_empty() {
             let levels = self.levels.iter().map(UpsampledLevel::memory_use);

@@ -183,7 +183,7 @@ impl IndirectScene {
         {
             let update_inputs = EmissionUpdateInputs {
                 queue: scene.queue,
-                light_count: inputs.lights.count(),
+                lights: inputs.lights,
                 cells,
                 share: inputs.settings.emission_importance,
                 timestamps: scene.timestamps,

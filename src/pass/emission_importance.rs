@@ -9,7 +9,7 @@
 
 use super::dispatch_64;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
-use crate::resource::{EmissionCells, GBuffer, Photons};
+use crate::resource::{EmissionCells, GBuffer, Lights, Photons};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -43,6 +43,9 @@ pub(crate) const UPDATE_SLOTS: [Slot; 4] = [Slot::Uniform, Slot::StorageMut, Slo
 /// Part of what was counted in earlier frames that an update keeps: what a table says changes over a few frames.
 const KEPT: f32 = 0.75;
 
+/// Largest share of the photons that is led: the others keep an eye on all that may come to be seen.
+const MOST_SHARE: f32 = 0.999;
+
 /// The pass.
 #[derive(Debug)]
 pub struct EmissionImportance {
@@ -56,6 +59,13 @@ pub struct EmissionImportance {
 /// Uniforms and bind groups, of a view or of the update.
 #[derive(Debug)]
 pub struct EmissionImportanceResources {
+    count: Step,
+    update: Step,
+}
+
+/// Of one step: both may be recorded before either runs.
+#[derive(Debug)]
+struct Step {
     params: wgpu::Buffer,
     groups: BindGroupCache,
 }
@@ -67,8 +77,8 @@ pub struct EmissionImportanceInputs<'a> {
     pub queue: &'a wgpu::Queue,
     /// Paths of this frame.
     pub photons: &'a Photons,
-    /// How many lights they started from.
-    pub light_count: u32,
+    /// What they started from.
+    pub lights: &'a Lights,
     /// Where they are seen.
     pub g_buffer: &'a GBuffer,
     /// What is counted is added.
@@ -83,11 +93,11 @@ pub struct EmissionUpdateInputs<'a> {
     /// For the uniforms of this frame.
     pub queue: &'a wgpu::Queue,
     /// Lights of the frame.
-    pub light_count: u32,
+    pub lights: &'a Lights,
     /// The tables are written, the counts cleared.
     pub cells: &'a EmissionCells,
-    /// Share of the photons that start where paths were seen, in [0, 1); the others are spread evenly, so that nothing is
-    /// overlooked for good.
+    /// Share of the photons that start where paths were seen, from 0 to 0.999, or what is nearest to it; the others are
+    /// spread evenly, so that nothing is overlooked for good.
     pub share: f32,
     /// Sink for GPU time.
     pub timestamps: Option<&'a Timestamps>,
@@ -140,23 +150,26 @@ impl EmissionImportance {
         let params = gpu::Params {
             path_count: inputs.photons.count(),
             slot_count: inputs.photons.slots(),
-            light_count: inputs.light_count,
+            light_count: inputs.lights.count(),
             row,
             share: 0.0,
             kept: 0.0,
         };
         inputs
             .queue
-            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+            .write_buffer(&resources.count.params, 0, bytemuck::bytes_of(&params));
         let bound = [
-            (&resources.params).into(),
+            (&resources.count.params).into(),
             inputs.photons.buffer().into(),
             inputs.cells.counts().into(),
             inputs.g_buffer.view_buffer().into(),
             (&inputs.g_buffer.views().depth).into(),
         ];
         let label = "lightfall::EmissionImportance::count";
-        let group = resources.groups.get(&self.device, label, &self.count_layout, &bound);
+        let group = resources
+            .count
+            .groups
+            .get(&self.device, label, &self.count_layout, &bound);
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.count);
         pass.set_bind_group(0, &group, &[]);
@@ -173,26 +186,30 @@ impl EmissionImportance {
         let params = gpu::Params {
             path_count: 0,
             slot_count: 0,
-            light_count: inputs.light_count,
+            light_count: inputs.lights.count(),
             row: 0,
-            share: inputs.share,
+            // The larger of NaN and 0 is 0.
+            share: inputs.share.max(0.0).min(MOST_SHARE),
             kept: KEPT,
         };
         inputs
             .queue
-            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+            .write_buffer(&resources.update.params, 0, bytemuck::bytes_of(&params));
         let bound = [
-            (&resources.params).into(),
+            (&resources.update.params).into(),
             inputs.cells.counts().into(),
             inputs.cells.history().into(),
             inputs.cells.tables().into(),
         ];
         let label = "lightfall::EmissionImportance::update";
-        let group = resources.groups.get(&self.device, label, &self.update_layout, &bound);
+        let group = resources
+            .update
+            .groups
+            .get(&self.device, label, &self.update_layout, &bound);
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.update);
         pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups(inputs.light_count, 1, 1);
+        pass.dispatch_workgroups(inputs.lights.count(), 1, 1);
     }
 }
 
@@ -202,14 +219,20 @@ impl EmissionImportanceResources {
     /// # Errors
     /// [`Error::LimitExceeded`] if the device grants next to nothing.
     pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
+        let step = || -> Result<_, Error> {
+            Ok(Step {
+                params: device::uniform_buffer::<gpu::Params>(device, "lightfall::EmissionImportance::params")?,
+                groups: BindGroupCache::default(),
+            })
+        };
         Ok(Self {
-            params: device::uniform_buffer::<gpu::Params>(device, "lightfall::EmissionImportance::params")?,
-            groups: BindGroupCache::default(),
+            count: step()?,
+            update: step()?,
         })
     }
 
     /// Bytes allocated.
     pub fn memory_use(&self) -> u64 {
-        self.params.size()
+        self.count.params.size() + self.update.params.size()
     }
 }

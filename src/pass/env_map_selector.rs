@@ -2,13 +2,14 @@
 //!
 //! Inputs: [`Geometry`], candidates, and photons of an earlier frame if there are any. Output: a [`Selection`], a frame or
 //! two later. Each candidate is captured at 32² texels a face into one atlas. What it sees is counted in one of two ways: in
-//! samples of the surfaces where photons arrived and of what is seen from there, or by area (Yao et al. 2010, Eq. 1), texel by texel. Greedily the candidate
-//! that sees the most new is added, until there are enough maps or the coverage target is reached; then maps are swapped
-//! while that helps (section 4.1). Nothing leaves the GPU but the result, and nothing waits for it.
+//! samples of the surfaces where photons arrived and of what is seen from there, or by area (Yao et al. 2010, Eq. 1), texel by
+//! texel. Greedily the candidate that sees the most new is added, until there are enough maps or the coverage target is
+//! reached; then maps are exchanged while that helps (section 4.1), and those that are not needed are dropped. Nothing leaves
+//! the GPU but the result, and nothing waits for it.
 //!
 //! Cost: six coarse captures a candidate; by samples, a look-up for each sample and candidate, then (maps + swaps) ×
 //! candidates × samples / 32 words; by area, (maps + swaps) × candidates × 6144 texels. While a scene changes, a fifth of the
-//! candidates a frame and one swap every fifth frame keep the selection up to date. Limits: at 32² a texel is 3° wide, so
+//! candidates a frame and one exchange every fifth frame keep the selection up to date. Limits: at 32² a texel is 3° wide, so
 //! thin things are missed; areas are off by some percent (`docs/accuracy.md`); 31 maps fit the bit masks.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, RenderSpec, Slot};
@@ -155,7 +156,8 @@ pub struct EnvMapSelectorSettings {
     /// What is to be covered. [`EnvMapSelector`] itself goes by the photons that it is given, or not given.
     pub measure: CoverageMeasure,
     /// Share of what all candidates see at which no further map is added. Higher selects more maps, which cost
-    /// captures and find more of what rays hit. Below 1 a map must add at least 0.012 %; 1: as many as there may be.
+    /// captures and find more of what rays hit. Below 1 a map must be worth 0.012 % of all of it, and 0.2 % while things
+    /// move, a sample seen a second time counting a five-hundredth; 1: as many as there may be.
     pub coverage_target: f32,
     /// Frames over which all candidates are captured anew while the scene changes; each such round ends with one
     /// maintenance step. More frames are cheaper each and follow changes later.
@@ -222,13 +224,14 @@ const LEAST_GAIN_IN_MOTION: f32 = 2e-3;
 pub enum SelectionStep {
     /// Nothing yet.
     Capture,
-    /// Select anew: greedily, then swaps until stable.
+    /// Select anew: greedily, then exchanges until stable, then without the maps that are not needed.
     Select,
     /// One maintenance step of the present selection while geometry moves: drops maps whose places became invalid, adds
     /// where more is to be seen, and tries one swap. Valid maps that seem to be needed no more are kept: to drop them and
     /// take them back flickers.
     Maintain,
-    /// The same of geometry that has come to rest, and does without maps that are not needed any more.
+    /// A step for geometry that has come to rest: up to eight exchanges, by samples, and up to eight maps less that are not
+    /// needed any more.
     Settle,
 }
 

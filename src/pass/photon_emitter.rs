@@ -1,6 +1,6 @@
 //! Emits photons from every light and stores where they first land: hop 0 of [`Photons`].
 //!
-//! Inputs: [`Lights`], [`ShadowMaps`]. Output: [`Photons`], hop 0. Cost: proportional to the number of photons, one
+//! Inputs: [`Lights`], [`ShadowMaps`], and [`EmissionCells`] where photons are not spread evenly. Output: [`Photons`], hop 0. Cost: proportional to the number of photons, one
 //! texel fetch each. Directions follow the Halton sequence; first hits are looked up in the light's reflective shadow map
 //! (Yao et al. 2010, section 7). Limits: the extent of a light is not sampled.
 

@@ -14,7 +14,7 @@ pub struct Photon {
     /// Where the hop ended, unit frame.
     pub position: [f32; 3],
     /// Low two bits: a [`PhotonState`]. Bit 8: the path came straight from its light. Bit 9: the tracer is not sure of the
-    /// hop. Bits 16 to 31, the same for all hops of a path: see [`EmissionCells`](super::EmissionCells); bits 16 to 23 are the
+    /// hop. Bits 16 to 31, the same for all hops of a path, and 0 after its end: see [`EmissionCells`](super::EmissionCells); bits 16 to 23 are the
     /// cell that it started in, bits 24 to 31 b where photons start 2^((b − 128) / 16) times as densely there as if they were
     /// spread evenly, 0 where they are. Others 0.
     pub state: u32,

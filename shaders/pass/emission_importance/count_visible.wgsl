@@ -7,7 +7,6 @@
 @group(0) @binding(3) var<uniform> view: View;
 @group(0) @binding(4) var depth_texture: texture_2d<f32>;
 
-const CELLS: u32 = 256u;
 // A photon is seen if it lies no further from what its pixel shows than this share of the distance to the eye.
 const TOLERANCE: f32 = 0.02;
 
@@ -35,7 +34,7 @@ fn count_visible(@builtin(global_invocation_id) id: vec3u) {
     if light >= params.light_count {
         return;
     }
-    let cell = 2u * (light * CELLS + photon_cell(photon.state));
+    let cell = 2u * (light * EMISSION_CELL_TOTAL + photon_cell(photon.state));
     if slot < params.path_count {
         if (photon.state & PHOTON_STATE_MASK) != PHOTON_EMPTY {
             atomicAdd(&counts[cell], 1u);

@@ -6,27 +6,26 @@
 @group(0) @binding(2) var<storage, read_write> history: array<vec2f>;
 @group(0) @binding(3) var<storage, read_write> emission_tables: array<EmissionTable>;
 
-const CELLS: u32 = 256u;
 // Until so many hops of a cell's paths were seen, it counts as much like the mean of all cells: what few hops say is chance.
 const SEEN_BY_CHANCE: f32 = 4.0;
 
-var<workgroup> shares: array<f32, CELLS>;
-var<workgroup> sums: array<vec2f, CELLS>;
+var<workgroup> shares: array<f32, EMISSION_CELL_TOTAL>;
+var<workgroup> sums: array<vec2f, EMISSION_CELL_TOTAL>;
 var<workgroup> columns: array<f32, EMISSION_CELLS>;
 
-// A path is worth as much as what it brings scatters least: the error of a mean of samples is least where these are taken
-// in proportion to the root of the mean square of their values, here of the hops that are seen.
-@compute @workgroup_size(256)
+// The error of a mean of samples is least where these are taken in proportion to the root of the mean square of their values:
+// here of the hops that are seen of a path, one or none.
+@compute @workgroup_size(EMISSION_CELL_TOTAL)
 fn update_tables(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) cell: u32) {
     let light = group.x;
-    let at = light * CELLS + cell;
+    let at = light * EMISSION_CELL_TOTAL + cell;
     let counted = params.kept * history[at] + vec2f(f32(counts[2u * at]), f32(counts[2u * at + 1u]));
     history[at] = counted;
     counts[2u * at] = 0u;
     counts[2u * at + 1u] = 0u;
     sums[cell] = counted;
     workgroupBarrier();
-    for (var half = CELLS / 2u; half > 0u; half /= 2u) {
+    for (var half = EMISSION_CELL_TOTAL / 2u; half > 0u; half /= 2u) {
         if cell < half {
             sums[cell] += sums[cell + half];
         }

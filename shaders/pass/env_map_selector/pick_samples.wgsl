@@ -33,7 +33,8 @@ fn race() -> Race {
 }
 
 fn race_enter(race: ptr<function, Race>, index: u32, weight: f32, u: f32) {
-    let time = -log(1.0 - u) / weight;
+    // Above zero whatever the logarithm's rounding: times are compared by their bits.
+    let time = max(-log(1.0 - u), 0x1p-40) / weight;
     if weight > 0.0 && time < (*race).time {
         *race = Race(time, index);
     }

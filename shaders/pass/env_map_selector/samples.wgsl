@@ -118,7 +118,7 @@ fn try_exchanges(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_
     }
 }
 
-// Makes the best of them; if it gains nothing, the selection is stable.
+// Makes the best of them; if it gains too little, the selection is stable.
 @compute @workgroup_size(256)
 fn exchange_map(@builtin(local_invocation_index) lane: u32) {
     var own = vec2f(-1.0, 0.0);

@@ -239,9 +239,9 @@ fn uncovered(lane: u32) -> vec2f {
     return sum_lanes(lane, area);
 }
 
-// Where there is nothing to be seen, all of it is.
+// Where light arrives nowhere, all of it is seen; where candidates see nothing but backs, nothing.
 fn coverage(uncovered: vec2f) -> f32 {
-    return select(1.0, 1.0 - uncovered.x / uncovered.y, uncovered.y > 0.0);
+    return select(f32(params.sample_count > 0u), 1.0 - uncovered.x / uncovered.y, uncovered.y > 0.0);
 }
 
 // The unselected candidate that sees the most new, the first of equals; NONE if there is none left.
@@ -268,7 +268,7 @@ fn add(candidate: u32) {
 // target of 1 nothing is too little.
 @compute @workgroup_size(256)
 fn add_map(@builtin(local_invocation_index) lane: u32) {
-    let left = uncovered(lane);
+    let unseen_of_all = uncovered(lane);
     let addition = best_addition(lane);
     if lane != 0u || selection.is_done != 0u {
         return;
@@ -280,9 +280,9 @@ fn add_map(@builtin(local_invocation_index) lane: u32) {
     }
     let gain = sights[addition].unseen;
     let sees_nothing = params.sample_count > 0u && gain <= 0.0;
-    let is_worth_it = params.coverage_target >= 1.0 || gain >= params.least_gain * left.y;
+    let is_worth_it = params.coverage_target >= 1.0 || gain >= params.least_gain * unseen_of_all.y;
     let is_first = count == 0u && !sees_nothing;
-    if is_first || (is_worth_it && !is_satisfied(coverage(left))) {
+    if is_first || (is_worth_it && !is_satisfied(coverage(unseen_of_all))) {
         add(addition);
     } else {
         selection.is_done = 1u;
@@ -297,10 +297,10 @@ fn is_satisfied(covered: f32) -> bool {
 // After the greedy steps: swaps may follow, unless all that was asked for is seen.
 @compute @workgroup_size(256)
 fn begin_swaps(@builtin(local_invocation_index) lane: u32) {
-    let left = uncovered(lane);
+    let unseen_of_all = uncovered(lane);
     if lane == 0u {
-        selection.total = left.y;
-        selection.is_done = u32(is_satisfied(coverage(left)));
+        selection.total = unseen_of_all.y;
+        selection.is_done = u32(is_satisfied(coverage(unseen_of_all)));
         selection.is_stable = selection.is_done;
     }
 }

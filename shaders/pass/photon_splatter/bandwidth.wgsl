@@ -33,9 +33,14 @@ fn splat_limit(b: Bandwidth, photon: Photon) -> f32 {
     return max(0.0, b.max_radius * w / g_buffer_pixels_a_length(view));
 }
 
+// Where more photons start than elsewhere, the rule that goes by density narrows their kernels.
+fn splat_narrowing(b: Bandwidth, photon: Photon) -> f32 {
+    return select(1.0, inverseSqrt(photon_boost(photon.state)), b.rule == BANDWIDTH_DENSITY);
+}
+
 // No kernel of this photon is wider.
 fn splat_widest(b: Bandwidth, photon: Photon) -> f32 {
-    return min(b.scale * inverseSqrt(b.lowest * photon_boost(photon.state)), splat_limit(b, photon));
+    return min(b.scale * inverseSqrt(b.lowest) * splat_narrowing(b, photon), splat_limit(b, photon));
 }
 
 // Radius of a photon's kernel, unit frame (Yao et al. 2010, section 6, made dimensionless by area and pdf); 0 where nothing
@@ -50,9 +55,6 @@ fn splat_radius(b: Bandwidth, photon: Photon) -> f32 {
     } else if b.rule == BANDWIDTH_BIN {
         h *= inverseSqrt(clamp(bin_density(b, photon) / b.uniform_count, b.lowest, b.highest));
     }
-    if b.rule == BANDWIDTH_DENSITY {
-        h *= inverseSqrt(photon_boost(photon.state));
-    }
-    h = min(h, splat_limit(b, photon));
+    h = min(h * splat_narrowing(b, photon), splat_limit(b, photon));
     return select(0.0, h, h > 0.0);
 }

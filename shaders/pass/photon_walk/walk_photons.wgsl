@@ -28,18 +28,20 @@ fn scatter_flux(photon: Photon, bounce: u32, sequence_index: u32) -> vec3f {
 // One hop from a stored photon.
 fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) -> Photon {
     let light = photon_light(photon.light_and_surface);
+    let kept = photon.state & PHOTON_EMISSION;
     let normal = octahedral_unpack(photon.normal);
     let local = sampling_cosine(random_pair(sequence_index, 2u * bounce));
     let direction = normalize(sampling_frame(normal) * local);
     let hit = trace_ray(photon.position, normal, direction);
     if hit.kind != HIT_SURFACE && hit.kind != HIT_TENTATIVE {
-        return photon_gone(select(PHOTON_LOST, PHOTON_ESCAPED, hit.kind == HIT_ESCAPED), flux, direction, light);
+        let fate = select(PHOTON_LOST, PHOTON_ESCAPED, hit.kind == HIT_ESCAPED);
+        return photon_gone(fate | kept, flux, direction, light);
     }
     let cosines = local.z * max(0.0, -dot(hit.normal, direction));
     let distance = max(hit.distance, WALK_SHORTEST);
     return Photon(
         hit.position,
-        select(PHOTON_STORED, PHOTON_STORED | PHOTON_TENTATIVE, hit.kind == HIT_TENTATIVE) | (photon.state & PHOTON_EMISSION),
+        select(PHOTON_STORED, PHOTON_STORED | PHOTON_TENTATIVE, hit.kind == HIT_TENTATIVE) | kept,
         flux,
         WALK_INVERSE_PI * cosines / (distance * distance),
         octahedral_pack(hit.normal),
