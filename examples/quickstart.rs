@@ -43,6 +43,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let view_inputs = ViewInputs {
         queue,
         geometry: &geometry,
+        bvh: None,
         view: &cameras[0],
         accumulated: 0,
         composite: &composite,

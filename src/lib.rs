@@ -78,6 +78,7 @@
 //! let view_inputs = ViewInputs {
 //!     queue: &queue,
 //!     geometry: &geometry,
+//!     bvh: None,
 //!     view: &cameras[0],
 //!     accumulated: 0,
 //!     composite: &composite,

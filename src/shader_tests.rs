@@ -2,11 +2,11 @@
 //! bindings match bind group layouts, and nothing needs more than the default limits.
 
 use crate::gpu::Slot;
-use crate::pass::photon_splatter::{raster, sort, tiled};
+use crate::pass::photon_splatter::{raster, tiled};
 use crate::pass::{
-    accumulator, composite, depth_hierarchy_build, direct_light, emission_importance, env_map_selector,
-    image_space_tracer, nearest_occluder, photon_emitter, photon_splatter, photon_walk, soft_shadow, tone_map,
-    trace_statistics, upsampler,
+    accumulator, composite, depth_hierarchy_build, direct_light, emission_importance, env_map_lighting,
+    env_map_selector, final_gather, image_space_tracer, nearest_occluder, photon_emitter, photon_splatter, photon_walk,
+    soft_shadow, stable_sort, tone_map, trace_statistics, upsampler,
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
@@ -289,7 +289,14 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::PHOTON_SPLATTER_TILED, "Splat", tiled::gpu::Splat {
             position, inverse_radius_squared, strength, normal,
         }),
-        twin!(wgsl::PHOTON_SPLATTER_SORT, "SortParams", sort::gpu::SortParams { count, blocks, shift, row }),
+        twin!(wgsl::ENV_MAP_LIGHTING, "Params", env_map_lighting::gpu::Params {
+            bandwidth, first_slot, slot_count, row, cells, map_size, size, light_count, shadow_map_size, is_corrected,
+            sample_offset,
+        }),
+        twin!(wgsl::FINAL_GATHER_SUM, "Params", final_gather::gpu::Params {
+            factor, ray_count, sample_offset, map_count, map_size,
+        }),
+        twin!(wgsl::STABLE_SORT, "SortParams", stable_sort::gpu::SortParams { count, blocks, shift, row }),
         twin!(wgsl::PHOTON_SPLATTER_QUADS, "RasterParams", raster::gpu::RasterParams {
             bandwidth, clip_scale, clip_shift, first_slot, slot_count, row, _pad,
         }),
@@ -436,17 +443,21 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         #[cfg(feature = "bvh")]
         "BvhTracer" => vec![&photon_walk::SLOTS, &bvh_geometry::BVH_SLOTS, &bvh_tracer::LOST_SLOTS],
         #[cfg(feature = "bvh")]
-        "BvhTracer rays" => vec![&bvh_tracer::RAY_SLOTS, &bvh_geometry::BVH_SLOTS],
+        "BvhTracer rays" | "BvhTracer surface rays" => vec![&bvh_tracer::RAY_SLOTS, &bvh_geometry::BVH_SLOTS],
         "EmissionImportance count" => vec![&emission_importance::COUNT_SLOTS],
         "EmissionImportance update" => vec![&emission_importance::UPDATE_SLOTS],
         "PhotonSplatter receivers" => vec![&photon_splatter::RECEIVER_SLOTS],
         "PhotonSplatter tiled" => vec![&tiled::TILED_SLOTS],
-        "PhotonSplatter sort" => vec![&sort::SORT_SLOTS],
+        "StableSort" => vec![&stable_sort::SORT_SLOTS],
         "PhotonSplatter gather" => vec![&tiled::GATHER_SLOTS],
         "PhotonSplatter marked" => vec![&tiled::MARKED_SLOTS],
         "PhotonSplatter bins" => vec![&raster::BIN_SLOTS],
         "PhotonSplatter quads" | "PhotonSplatter volumes" => vec![&raster::RASTER_SLOTS],
         "PhotonSplatter finish" => vec![&photon_splatter::FINISH_SLOTS],
+        "EnvMapLighting sort" => vec![&env_map_lighting::SORT_SLOTS],
+        "EnvMapLighting" => vec![&env_map_lighting::LIGHT_SLOTS],
+        "FinalGather spread" => vec![&final_gather::SPREAD_SLOTS],
+        "FinalGather sum" => vec![&final_gather::SUM_SLOTS],
         "DirectLight" => vec![&direct_light::SLOTS, &direct_light::VISIBILITY_SLOTS],
         "NearestOccluder" => vec![&nearest_occluder::SLOTS],
         "SoftShadow test" => vec![&soft_shadow::TEST_SLOTS],

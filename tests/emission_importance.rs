@@ -9,6 +9,7 @@ use lightfall::frame::{Settings, TracerKind};
 use lightfall::glam::DVec3;
 use lightfall::resource::{Photon, PhotonState};
 use lightfall::scene::{Light, Scene, samples};
+use std::collections::BTreeSet;
 
 /// Cells along an axis of a light's emission.
 const CELLS: usize = 16;
@@ -158,7 +159,9 @@ fn all_photons_led_are_refused_and_none_need_no_memory() {
     let has_cells = |importance| {
         let offline = rendered(&gpu, &doorway(), &settings(importance));
         let list = offline.memory_by_resource();
-        list.iter().any(|(name, _)| *name == "emission_cells")
+        let names: BTreeSet<_> = list.iter().map(|(name, _)| *name).collect();
+        assert_eq!(names.len(), list.len(), "each name once: {list:?}");
+        names.contains("emission_cells")
     };
     assert!(!has_cells(0.0) && has_cells(0.5));
     assert_no_errors(&gpu);

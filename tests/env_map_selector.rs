@@ -566,6 +566,7 @@ impl<'a> Host<'a> {
         let view_inputs = ViewInputs {
             queue,
             geometry: &self.geometry,
+            bvh: None,
             view: &cameras[0],
             accumulated: 0,
             composite: &CompositeSettings::default(),

@@ -194,6 +194,7 @@ fn composed(engine: &Engine, subsampling: Subsampling) -> Composed {
     let inputs = ViewInputs {
         queue,
         geometry,
+        bvh: None,
         view: &cameras[0],
         accumulated: 0,
         composite: &composite,

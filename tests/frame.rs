@@ -4,7 +4,9 @@
 mod common;
 
 use common::{Component, Gpu, Offline, assert_no_errors, gpu, mean, offline};
-use lightfall::frame::{GiRenderer, SceneInputs, Settings, Stage, TracerKind, ViewInputs, ViewResources};
+use lightfall::frame::{
+    GiRenderer, IndirectMethod, SceneInputs, Settings, Stage, TracerKind, ViewInputs, ViewResources,
+};
 use lightfall::glam::{DVec3, Vec3};
 use lightfall::pass::*;
 use lightfall::resource::*;
@@ -70,6 +72,7 @@ fn record(
     let view_inputs = ViewInputs {
         queue,
         geometry,
+        bvh: Some(bvh),
         view: &cameras[0],
         accumulated: 0,
         composite: &composite,
@@ -94,30 +97,80 @@ fn every_pass_is_made_and_recorded_on_a_device_that_grants_only_the_defaults() {
 
 fn make_and_record_every_pass(device: &wgpu::Device, queue: &wgpu::Queue) {
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+    use IndirectMethod::{FinalGather as G, Splatting as P};
     use {Kernel as K, SplatShape as Shape, Subsampling as S, TraceMethod as Method, TracerKind as Kind};
-    for (shape, kernel, kind, method, subsampling) in [
+    let combinations = [
         (
             Shape::Tiled,
             K::Epanechnikov,
             Kind::ImageSpace,
             Method::OrderedMarch,
             S::Full,
+            P,
         ),
-        (Shape::Tiled, K::Cone, Kind::Bvh, Method::Plane, S::Half),
-        (Shape::Tiled, K::Cone, Kind::ImageSpace, Method::VerifiedWalk, S::Half),
-        (Shape::Tiled, K::Cone, Kind::ImageSpace, Method::NearestWalk, S::Half),
-        (Shape::Tiled, K::Cone, Kind::ImageSpace, Method::NearestMarch, S::Half),
-        (Shape::Quads, K::Constant, Kind::ImageSpace, Method::Paper, S::Quarter),
-        (Shape::Quads, K::Cone, Kind::Hybrid, Method::OrderedWalk, S::Full),
-        (Shape::Tiled, K::Constant, Kind::Hybrid, Method::OrderedMarch, S::Eighth),
-    ] {
+        (Shape::Tiled, K::Cone, Kind::Bvh, Method::Plane, S::Half, P),
+        (
+            Shape::Tiled,
+            K::Cone,
+            Kind::ImageSpace,
+            Method::VerifiedWalk,
+            S::Half,
+            P,
+        ),
+        (Shape::Tiled, K::Cone, Kind::ImageSpace, Method::NearestWalk, S::Half, P),
+        (
+            Shape::Tiled,
+            K::Cone,
+            Kind::ImageSpace,
+            Method::NearestMarch,
+            S::Half,
+            P,
+        ),
+        (
+            Shape::Quads,
+            K::Constant,
+            Kind::ImageSpace,
+            Method::Paper,
+            S::Quarter,
+            P,
+        ),
+        (Shape::Quads, K::Cone, Kind::Hybrid, Method::OrderedWalk, S::Full, P),
+        (
+            Shape::Tiled,
+            K::Constant,
+            Kind::Hybrid,
+            Method::OrderedMarch,
+            S::Eighth,
+            P,
+        ),
+        (
+            Shape::Tiled,
+            K::Cone,
+            Kind::ImageSpace,
+            Method::OrderedWalk,
+            S::Quarter,
+            G,
+        ),
+        (Shape::Tiled, K::Cone, Kind::Bvh, Method::Plane, S::Eighth, G),
+        (Shape::Tiled, K::Cone, Kind::Hybrid, Method::Paper, S::Half, G),
+    ];
+    for (index, (shape, kernel, kind, method, subsampling, indirect_method)) in combinations.into_iter().enumerate() {
         let mut settings = small();
         settings.subsampling = subsampling;
         settings.splatter_config.shape = shape;
         settings.splatter_config.kernel = kernel;
+        settings.splatter_config.keeps_to_surfaces = index % 2 == 0;
         settings.tracer_kind = kind;
         settings.trace_method = method;
-        for name in samples::NAMES {
+        settings.indirect_method = indirect_method;
+        settings.emission_importance = 0.5 * (index % 2) as f32;
+        // The furnished ones, which take longest, once.
+        let names = if index == 0 {
+            &samples::NAMES[..]
+        } else {
+            &samples::NAMES[..7]
+        };
+        for name in names {
             let scene = samples::by_name(name, 0.5).unwrap();
             let mut geometry = MeshGeometry::new(device, queue, &scene).unwrap();
             let mut bvh = triangles(device, queue, &scene);
@@ -870,6 +923,7 @@ fn record_views(
         let inputs = ViewInputs {
             queue,
             geometry,
+            bvh: None,
             view: camera,
             accumulated: 0,
             composite: &CompositeSettings::default(),

@@ -128,6 +128,7 @@ impl<'a> Offline<'a> {
         let view_inputs = ViewInputs {
             queue,
             geometry,
+            bvh: self.bvh.as_ref(),
             view: &cameras[0],
             accumulated,
             composite: &self.composite,

@@ -25,21 +25,6 @@ fn is_lit(light: Light, p: vec3f, n: vec3f) -> bool {
     return shadow_is_lit(light, probe, texel, p, n, params.shadow_map_size);
 }
 
-// Irradiance that an unoccluded light gives a surface element.
-fn unoccluded(light: Light, p: vec3f, n: vec3f) -> vec3f {
-    if light.kind == LIGHT_DIRECTIONAL {
-        return light.intensity * max(0.0, -dot(n, light.direction));
-    }
-    let to_light = light.position - p;
-    let distance_squared = max(dot(to_light, to_light), 0x1p-60);
-    let l = to_light * inverseSqrt(distance_squared);
-    var falloff = 1.0;
-    if light.kind == LIGHT_SPOT {
-        falloff = sampling_spot_falloff(sampling_one_minus_cos(-l, light.direction), light.inner, light.outer);
-    }
-    return light.intensity * (falloff * max(0.0, dot(n, l)) / distance_squared);
-}
-
 struct Surface {
     is_seen: bool,
     position: vec3f,
@@ -66,7 +51,7 @@ fn light_pixels(@builtin(global_invocation_id) id: vec3u) {
     }
     var sum = vec3f(0.0);
     for (var i = 0u; i < params.light_count; i++) {
-        let e = unoccluded(lights[i], surface.position, surface.normal);
+        let e = light_irradiance(lights[i], surface.position, surface.normal);
         if any(e > vec3f(0.0)) && is_lit(lights[i], surface.position, surface.normal) {
             sum += e;
         }
@@ -88,7 +73,7 @@ fn light_pixels_by_visibility(@builtin(global_invocation_id) id: vec3u) {
     let layers = textureNumLayers(visibility) - 1u;
     var sum = vec3f(0.0);
     for (var i = 0u; i < params.light_count; i++) {
-        let e = unoccluded(lights[i], surface.position, surface.normal);
+        let e = light_irradiance(lights[i], surface.position, surface.normal);
         if !any(e > vec3f(0.0)) {
             continue;
         }

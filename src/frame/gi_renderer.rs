@@ -8,22 +8,22 @@
 use super::emission_schedule::EmissionSchedule;
 use super::env_map_placement::{EnvMapPlacement, PlacementInputs, SelectionContext};
 use super::indirect_scene::{IndirectScene, PhotonInputs, PhotonPasses};
+use super::indirect_view::{IndirectView, IndirectViewInputs, ViewPasses};
 use super::recapture::Recapture;
 use super::selection_schedule::{PHOTON_ROUNDS, Work};
-use super::{Plan, Settings, Stage, Upsampling};
+use super::{IndirectMethod, Plan, Settings, Stage};
 use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, CoverageMeasure, DirectLight, DirectLightInputs,
-    DirectLightResources, EmissionImportanceInputs, EmissionImportanceResources, EnvMapSelector, GBufferCapture,
-    GBufferCaptureInputs, MarkedSplatInputs, NearestOccluder, NearestOccluderInputs, NearestOccluderResources,
-    PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings, ShadowMapCapture,
-    ShadowMapCaptureInputs, ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources, SplatShape,
-    Upsampler, UpsamplerInputs, UpsamplerResources, progressive_scale,
+    DirectLightResources, EnvMapSelector, GBufferCapture, GBufferCaptureInputs, NearestOccluder, NearestOccluderInputs,
+    NearestOccluderResources, PhotonSplatter, PhotonSplatterResources, ShadowMapCapture, ShadowMapCaptureInputs,
+    ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources,
 };
 #[cfg(feature = "bvh")]
 use crate::resource::BvhGeometry;
 use crate::resource::{
-    CameraView, CapturePurpose, CaptureView, DepthHierarchy, EmissionCells, EnvMaps, GBuffer, Geometry, Irradiance,
-    Lights, MarkedPixels, NearestOccluders, Photons, PrepareContext, Radiance, ShadowMaps, Subsampling, Visibility,
+    CameraView, CapturePurpose, CaptureView, DepthHierarchy, EmissionCells, EnvMapIrradiance, EnvMaps, GBuffer,
+    Geometry, Irradiance, Lights, MarkedPixels, NearestOccluders, Photons, PrepareContext, Radiance, ShadowMaps,
+    Visibility,
 };
 use crate::scene::{Camera, Light, LightKind, Projection, SceneBounds, SceneSummary, UnitFrame};
 use crate::{Error, Timestamps};
@@ -71,8 +71,7 @@ struct Passes {
     direct_light: DirectLight,
     env_map_selector: EnvMapSelector,
     photons: PhotonPasses,
-    photon_splatter: PhotonSplatter,
-    upsampler: Upsampler,
+    view: ViewPasses,
     composite: Composite,
 }
 
@@ -112,27 +111,6 @@ pub struct ViewResources {
     generation: u64,
 }
 
-/// Allocated while there is indirect light.
-#[derive(Debug)]
-struct IndirectView {
-    splatter: PhotonSplatterResources,
-    estimated: Irradiance,
-    /// If photons start where they count.
-    importance: Option<EmissionImportanceResources>,
-    /// From coarse to fine, while fewer pixels are estimated than seen.
-    levels: Vec<UpsampledLevel>,
-}
-
-/// Irradiance made of that of the level before.
-#[derive(Debug)]
-struct UpsampledLevel {
-    subsampling: Subsampling,
-    irradiance: Irradiance,
-    upsampler: UpsamplerResources,
-    /// What is estimated anew.
-    marked: Option<MarkedPixels>,
-}
-
 /// What [`GiRenderer::record_scene`] needs.
 #[derive(Clone, Copy)]
 #[allow(missing_debug_implementations, reason = "holds a trait object of the host's")]
@@ -159,6 +137,10 @@ pub struct ViewInputs<'a> {
     pub queue: &'a wgpu::Queue,
     /// The geometry that was prepared.
     pub geometry: &'a dyn Geometry,
+    /// The same geometry as triangles, prepared for this frame: what rays of [`Stage::FinalGather`] meet where the settings
+    /// trace triangles.
+    #[cfg(feature = "bvh")]
+    pub bvh: Option<&'a BvhGeometry>,
     /// One of the views that were prepared.
     pub view: &'a CameraView,
     /// Frames of this view that are in the mean already, where frames are accumulated: kernels narrow with them
@@ -197,8 +179,7 @@ impl GiRenderer {
             direct_light: DirectLight::new(device),
             env_map_selector: EnvMapSelector::new(device),
             photons: PhotonPasses::new(device, settings),
-            photon_splatter: PhotonSplatter::new(device, &settings.splatter_config)?,
-            upsampler: Upsampler::new(device),
+            view: ViewPasses::new(device, settings)?,
             composite: Composite::new(device, wgpu::TextureFormat::Rgba32Float),
         };
         Ok(Self {
@@ -310,7 +291,10 @@ impl GiRenderer {
         if !plan.is_on(Stage::PhotonEmitter) {
             self.indirect = None;
         } else if self.indirect.is_none() {
-            PhotonSplatterResources::check(device, &settings.splatter_config, settings.photons, settings.bounces)?;
+            if settings.indirect_method == IndirectMethod::Splatting {
+                let config = &settings.splatter_config;
+                PhotonSplatterResources::check(device, config, settings.photons, settings.bounces)?;
+            }
             self.generation = next_generation();
             self.photons_frame = None;
             self.recapture.forget();
@@ -356,7 +340,7 @@ impl GiRenderer {
     /// # Errors
     /// [`Error::ReadBack`], [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
     pub fn place_env_maps_blocking(&mut self, queue: &wgpu::Queue, geometry: &mut dyn Geometry) -> Result<(), Error> {
-        if !self.settings.tracer_kind.uses_env_maps() {
+        if !self.settings.needs_env_maps() {
             return Ok(());
         }
         self.select_blocking(queue, geometry, false)?;
@@ -521,6 +505,8 @@ impl GiRenderer {
                 views: &self.views[self.env_map_views.clone()],
                 layers: &self.env_map_layers,
                 updates_emission: self.emission.take_update(),
+                area: self.state.as_ref().map_or(1.0, |s| s.area),
+                radius: self.state.as_ref().map_or(1.0, |s| s.frame.radius()),
             };
             indirect.record(encoder, &self.passes.photons, &photon_inputs)?;
             self.recapture.recorded();
@@ -536,6 +522,19 @@ impl GiRenderer {
             return Err(Error::MissingInput {
                 stage: "BvhTracer",
                 input: "SceneInputs::bvh",
+                remedy: "prepare a BvhGeometry each frame, or choose tracer.kind = image-space",
+            });
+        }
+        Ok(())
+    }
+
+    #[cfg(feature = "bvh")]
+    fn check_gathered_triangles(&self, inputs: &ViewInputs<'_>) -> Result<(), Error> {
+        let gathers = self.plan().is_some_and(|p| p.is_on(Stage::FinalGather));
+        if inputs.bvh.is_none() && gathers && self.settings.tracer_kind.uses_triangles() {
+            return Err(Error::MissingInput {
+                stage: "FinalGather",
+                input: "ViewInputs::bvh",
                 remedy: "prepare a BvhGeometry each frame, or choose tracer.kind = image-space",
             });
         }
@@ -624,13 +623,16 @@ impl GiRenderer {
     /// Records one view: its G-buffer, its irradiance, the sum. Two views of one submission need two [`ViewResources`].
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`] when a stage that the view needs for the first time does not fit.
+    /// [`Error::LimitExceeded`] when a stage that the view needs for the first time does not fit; [`Error::MissingInput`] if
+    /// [`Stage::FinalGather`] is on, the settings trace triangles, and none are given. Nothing is recorded then.
     pub fn record_view(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         resources: &mut ViewResources,
         inputs: &ViewInputs<'_>,
     ) -> Result<(), Error> {
+        #[cfg(feature = "bvh")]
+        self.check_gathered_triangles(inputs)?;
         self.allocate_view(resources)?;
         let g_buffer_inputs = GBufferCaptureInputs {
             queue: inputs.queue,
@@ -668,44 +670,22 @@ impl GiRenderer {
             };
             self.passes.direct_light.record(encoder, own, &direct_inputs);
         }
-        if let (Some(scene), Some(own), Some(state)) = (&self.indirect, &mut resources.indirect, &self.state) {
-            let settings = PhotonSplatterSettings {
-                radius_scale: progressive_scale(inputs.accumulated, self.settings.radius_alpha),
-                ..self.settings.splatter
-            };
-            let splatter_inputs = PhotonSplatterInputs {
-                queue: inputs.queue,
-                photons: &scene.photons,
+        if let (Some(scene), Some(own), Some(state), Some(direct)) =
+            (&self.indirect, &mut resources.indirect, &self.state, &self.direct)
+        {
+            let indirect_inputs = IndirectViewInputs {
+                view: inputs,
+                settings: &self.settings,
+                passes: (&self.passes.view, &self.passes.photons),
+                scene,
+                lights: &direct.lights,
                 g_buffer: &resources.g_buffer,
-                subsampling: self.settings.subsampling,
-                irradiance: &own.estimated,
                 area: state.area,
                 radius: state.frame.radius(),
                 sample_offset: self.sample_offset,
-                settings: &settings,
-                timestamps: inputs.timestamps,
+                counts_emission: self.emission.counts(),
             };
-            self.passes
-                .photon_splatter
-                .record(encoder, &mut own.splatter, &splatter_inputs);
-            self.upsample(encoder, &resources.g_buffer, own, inputs);
-            if let (Some(pass), Some(cells), Some(importance), Some(direct)) = (
-                &self.passes.photons.emission_importance,
-                scene.emission_cells(),
-                &mut own.importance,
-                &self.direct,
-            ) && self.emission.counts()
-            {
-                let importance_inputs = EmissionImportanceInputs {
-                    queue: inputs.queue,
-                    photons: &scene.photons,
-                    lights: &direct.lights,
-                    g_buffer: &resources.g_buffer,
-                    cells,
-                    timestamps: inputs.timestamps,
-                };
-                pass.record(encoder, importance, &importance_inputs);
-            }
+            own.record(encoder, &indirect_inputs)?;
         }
         let composite_inputs = CompositeInputs {
             queue: inputs.queue,
@@ -723,47 +703,6 @@ impl GiRenderer {
             .composite
             .record(encoder, &mut resources.composite, &composite_inputs);
         Ok(())
-    }
-
-    /// Records the levels between the pixels that were estimated and all of them.
-    fn upsample(
-        &self,
-        encoder: &mut wgpu::CommandEncoder,
-        g_buffer: &GBuffer,
-        own: &mut IndirectView,
-        inputs: &ViewInputs<'_>,
-    ) {
-        let (mut coarse, mut subsampling) = (&own.estimated, self.settings.subsampling);
-        for level in &mut own.levels {
-            let upsampler_inputs = UpsamplerInputs {
-                queue: inputs.queue,
-                g_buffer,
-                coarse,
-                subsampling,
-                target: level.subsampling,
-                irradiance: &level.irradiance,
-                marked: level.marked.as_ref(),
-                settings: &self.settings.upsampler,
-                timestamps: inputs.timestamps,
-            };
-            self.passes
-                .upsampler
-                .record(encoder, &mut level.upsampler, &upsampler_inputs);
-            if let Some(marked) = &level.marked {
-                let marked_inputs = MarkedSplatInputs {
-                    queue: inputs.queue,
-                    g_buffer,
-                    subsampling: level.subsampling,
-                    irradiance: &level.irradiance,
-                    marked,
-                    timestamps: inputs.timestamps,
-                };
-                self.passes
-                    .photon_splatter
-                    .record_marked(encoder, &mut own.splatter, &marked_inputs);
-            }
-            (coarse, subsampling) = (&level.irradiance, level.subsampling);
-        }
     }
 
     fn allocate_view(&self, view: &mut ViewResources) -> Result<(), Error> {
@@ -840,6 +779,11 @@ impl GiRenderer {
         self.indirect.as_ref().and_then(IndirectScene::env_maps)
     }
 
+    /// Light on what they show, while it is gathered from there.
+    pub fn env_map_irradiance(&self) -> Option<&EnvMapIrradiance> {
+        self.indirect.as_ref().and_then(IndirectScene::env_map_irradiance)
+    }
+
     /// Their depth hierarchies, if rays are searched for by walking over these.
     pub fn depth_hierarchy(&self) -> Option<&DepthHierarchy> {
         self.indirect.as_ref().and_then(IndirectScene::depth_hierarchy)
@@ -894,69 +838,6 @@ impl GiRenderer {
     }
 }
 
-impl IndirectView {
-    fn new(device: &wgpu::Device, settings: &Settings, photons: &Photons, size: [u32; 2]) -> Result<Self, Error> {
-        let config = &settings.splatter_config;
-        let estimated = settings.subsampling.size(size);
-        let splatter = PhotonSplatterResources::new(device, config, photons, estimated)?;
-        let estimated = Irradiance::new(device, estimated, wgpu::TextureFormat::Rgba32Float)?;
-        let by_levels = settings.upsampling == Upsampling::ByLevels;
-        let mut levels = Vec::new();
-        let mut finer = settings.subsampling.finer();
-        while let Some(subsampling) = finer {
-            finer = subsampling.finer();
-            if by_levels || finer.is_none() {
-                let is_marked = by_levels && config.shape == SplatShape::Tiled;
-                levels.push(UpsampledLevel::new(device, subsampling, size, is_marked)?);
-            }
-        }
-        let importance = (settings.emission_importance > 0.0).then(|| EmissionImportanceResources::new(device));
-        Ok(Self {
-            splatter,
-            estimated,
-            importance: importance.transpose()?,
-            levels,
-        })
-    }
-
-    /// At all pixels.
-    fn irradiance(&self) -> &Irradiance {
-        self.levels.last().map_or(&self.estimated, |l| &l.irradiance)
-    }
-
-    fn memory_by_resource(&self) -> Vec<(&'static str, u64)> {
-        let mut list = vec![
-            ("indirect_irradiance", self.estimated.memory_use()),
-            ("splatter", self.splatter.memory_use()),
-        ];
-        if let Some(importance) = &self.importance {
-            list.push(("emission_importance", importance.memory_use()));
-        }
-        if !self.levels.is_empty() {
-            let levels = self.levels.iter().map(UpsampledLevel::memory_use);
-            list.push(("upsampled_irradiance", levels.sum()));
-        }
-        list
-    }
-}
-
-impl UpsampledLevel {
-    fn new(device: &wgpu::Device, subsampling: Subsampling, full: [u32; 2], is_marked: bool) -> Result<Self, Error> {
-        let size = subsampling.size(full);
-        Ok(Self {
-            subsampling,
-            irradiance: Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?,
-            upsampler: UpsamplerResources::new(device)?,
-            marked: is_marked.then(|| MarkedPixels::new(device, size)).transpose()?,
-        })
-    }
-
-    fn memory_use(&self) -> u64 {
-        let marked = self.marked.as_ref().map_or(0, MarkedPixels::memory_use);
-        self.irradiance.memory_use() + self.upsampler.memory_use() + marked
-    }
-}
-
 impl ViewResources {
     /// The finished image.
     pub fn radiance(&self) -> &Radiance {
@@ -980,8 +861,7 @@ impl ViewResources {
 
     /// What was estimated anew at each level of up-sampling, from coarse to fine; nothing where pixels are interpolated only.
     pub fn marked_pixels(&self) -> impl Iterator<Item = &MarkedPixels> {
-        let levels = self.indirect.as_ref().map_or(&[][..], |i| &i.levels);
-        levels.iter().filter_map(|l| l.marked.as_ref())
+        self.indirect.iter().flat_map(IndirectView::marked_pixels)
     }
 
     /// Indirect irradiance, if there is any.

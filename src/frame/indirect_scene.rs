@@ -1,16 +1,19 @@
 //! What all views share of indirect light: photons, and what the settings let them meet.
 
-use super::{SceneInputs, Settings, TracerKind};
+use super::{IndirectMethod, SceneInputs, Settings, TracerKind};
 use crate::Error;
 #[cfg(feature = "bvh")]
 use crate::pass::{BvhTracer, BvhTracerInputs, BvhTracerResources};
 use crate::pass::{
     DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EmissionImportance,
     EmissionImportanceResources, EmissionUpdateInputs, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources,
-    ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitter, PhotonEmitterInputs,
-    PhotonEmitterResources, SharedHop,
+    EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources, EnvMapLightingSettings, ImageSpaceTracer,
+    ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources,
+    SharedHop,
 };
-use crate::resource::{CaptureView, DepthHierarchy, EmissionCells, EnvMaps, Lights, LostRays, Photons, ShadowMaps};
+use crate::resource::{
+    CaptureView, DepthHierarchy, EmissionCells, EnvMapIrradiance, EnvMaps, Lights, LostRays, Photons, ShadowMaps,
+};
 
 /// From the lights to the last surface.
 #[derive(Debug)]
@@ -22,9 +25,11 @@ pub(super) struct PhotonPasses {
     pub(super) emission_importance: Option<EmissionImportance>,
     photon_emitter: PhotonEmitter,
     /// Those that the settings use.
-    image_space_tracer: Option<ImageSpaceTracer>,
+    pub(super) image_space_tracer: Option<ImageSpaceTracer>,
     #[cfg(feature = "bvh")]
-    bvh_tracer: Option<BvhTracer>,
+    pub(super) bvh_tracer: Option<BvhTracer>,
+    /// If light is gathered from there.
+    env_map_lighting: Option<EnvMapLighting>,
 }
 
 /// Allocated while there is indirect light.
@@ -41,7 +46,7 @@ pub(super) struct IndirectScene {
     lost: Option<LostRays>,
 }
 
-/// Allocated while rays are traced in image space.
+/// Allocated while rays are traced, or light is gathered, in image space.
 #[derive(Debug)]
 struct ImageSpaceScene {
     env_maps: EnvMaps,
@@ -49,6 +54,8 @@ struct ImageSpaceScene {
     /// If the method needs it.
     hierarchy: Option<(DepthHierarchy, DepthHierarchyBuildResources)>,
     tracer: ImageSpaceTracerResources,
+    /// If light is gathered.
+    lighting: Option<(EnvMapIrradiance, EnvMapLightingResources)>,
 }
 
 /// What recording needs beside a host's inputs.
@@ -64,6 +71,10 @@ pub(super) struct PhotonInputs<'a> {
     pub(super) layers: &'a [u32],
     /// Whether it is time to look where photons are seen.
     pub(super) updates_emission: bool,
+    /// Of all surfaces, unit frame.
+    pub(super) area: f32,
+    /// Of the region, unit frame.
+    pub(super) radius: f32,
 }
 
 impl PhotonPasses {
@@ -77,6 +88,10 @@ impl PhotonPasses {
             image_space_tracer: kind.uses_env_maps().then(|| ImageSpaceTracer::new(device, method)),
             #[cfg(feature = "bvh")]
             bvh_tracer: kind.uses_triangles().then(|| BvhTracer::new(device)),
+            env_map_lighting: (settings.indirect_method == IndirectMethod::FinalGather).then(|| {
+                let config = &settings.splatter_config;
+                EnvMapLighting::new(device, config.kernel, config.keeps_to_surfaces)
+            }),
         }
     }
 }
@@ -99,7 +114,15 @@ impl IndirectScene {
                     DepthHierarchyBuildResources::new(device, &env_maps)?,
                 ))
             };
+            let lighting = || {
+                Ok((
+                    EnvMapIrradiance::new(device, &env_maps, settings.final_gather.map_size)?,
+                    EnvMapLightingResources::new(device, &photons)?,
+                ))
+            };
+            let gathers = settings.indirect_method == IndirectMethod::FinalGather;
             Ok(ImageSpaceScene {
+                lighting: gathers.then(lighting).transpose()?,
                 hierarchy: settings.needs_hierarchy().then(hierarchy).transpose()?,
                 env_maps,
                 capture: EnvMapCaptureResources::new(device, settings.env_map_size)?,
@@ -113,7 +136,7 @@ impl IndirectScene {
         Ok(Self {
             emission: (settings.emission_importance > 0.0).then(emission).transpose()?,
             emitter: PhotonEmitterResources::new(device)?,
-            image_space: kind.uses_env_maps().then(image_space).transpose()?,
+            image_space: settings.needs_env_maps().then(image_space).transpose()?,
             #[cfg(feature = "bvh")]
             bvh_tracer: kind
                 .uses_triangles()
@@ -132,6 +155,10 @@ impl IndirectScene {
 
     pub(super) fn env_maps(&self) -> Option<&EnvMaps> {
         self.image_space.as_ref().map(|i| &i.env_maps)
+    }
+
+    pub(super) fn env_map_irradiance(&self) -> Option<&EnvMapIrradiance> {
+        self.image_space.as_ref()?.lighting.as_ref().map(|l| &l.0)
     }
 
     pub(super) fn emission_cells(&self) -> Option<&EmissionCells> {
@@ -203,9 +230,43 @@ impl IndirectScene {
             .photon_emitter
             .record(encoder, &mut self.emitter, &emitter_inputs);
         if self.lost.is_none() {
-            return self.record_walk(encoder, passes, inputs, None);
+            self.record_walk(encoder, passes, inputs, None)?;
+        } else {
+            let mut hops = 1..=self.photons.bounces();
+            hops.try_for_each(|hop| self.record_walk(encoder, passes, inputs, Some(hop)))?;
         }
-        (1..=self.photons.bounces()).try_for_each(|hop| self.record_walk(encoder, passes, inputs, Some(hop)))
+        self.record_lighting(encoder, passes, inputs);
+        Ok(())
+    }
+
+    /// Of what environment maps show.
+    fn record_lighting(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        passes: &PhotonPasses,
+        inputs: &PhotonInputs<'_>,
+    ) {
+        if let (Some(pass), Some(image_space)) = (&passes.env_map_lighting, &mut self.image_space)
+            && let Some((irradiance, own)) = &mut image_space.lighting
+        {
+            let lighting_inputs = EnvMapLightingInputs {
+                queue: inputs.scene.queue,
+                env_maps: &image_space.env_maps,
+                photons: &self.photons,
+                lights: inputs.lights,
+                shadow_maps: inputs.shadow_maps,
+                irradiance,
+                area: inputs.area,
+                radius: inputs.radius,
+                sample_offset: inputs.scene.sample_offset,
+                settings: &EnvMapLightingSettings {
+                    bandwidth: inputs.settings.splatter.bandwidth,
+                    boundary: inputs.settings.splatter.boundary,
+                },
+                timestamps: inputs.scene.timestamps,
+            };
+            pass.record(encoder, own, &lighting_inputs);
+        }
     }
 
     /// Of each tracer that there is, the whole walk or one hop.
@@ -260,6 +321,9 @@ impl IndirectScene {
             list.push(("env_maps", maps));
             if let Some((hierarchy, own)) = &image_space.hierarchy {
                 list.push(("depth_hierarchy", hierarchy.memory_use() + own.memory_use()));
+            }
+            if let Some((irradiance, own)) = &image_space.lighting {
+                list.push(("env_map_lighting", irradiance.memory_use() + own.memory_use()));
             }
             uniforms += image_space.tracer.memory_use();
         }

@@ -5,6 +5,7 @@ mod emission_schedule;
 mod env_map_placement;
 mod gi_renderer;
 mod indirect_scene;
+mod indirect_view;
 mod plan;
 mod recapture;
 mod selection_schedule;
@@ -12,4 +13,4 @@ mod settings;
 
 pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};
 pub use plan::{Plan, PlannedStage, Stage};
-pub use settings::{Settings, TracerKind, Upsampling};
+pub use settings::{FinalGatherSettings, IndirectMethod, Settings, TracerKind, Upsampling};

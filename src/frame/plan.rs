@@ -1,6 +1,6 @@
 //! Model only what the scene requires: which stages run, and why.
 
-use super::{Settings, TracerKind};
+use super::{IndirectMethod, Settings, TracerKind};
 use crate::pass::PenumbraSearch;
 use crate::scene::SceneSummary;
 use std::fmt;
@@ -32,8 +32,12 @@ pub enum Stage {
     ImageSpaceTracer,
     /// Photons from triangle to triangle.
     BvhTracer,
+    /// Light on what environment maps show.
+    EnvMapLighting,
     /// Photons to irradiance.
     PhotonSplatter,
+    /// What rays bring back from lit environment maps.
+    FinalGather,
     /// Irradiance of some pixels to all of them.
     Upsampler,
     /// Photons by way of mirrors and glass.
@@ -97,6 +101,7 @@ impl Plan {
         let [selection, maps, hierarchies] = map_stages(&indirect, settings);
         let [image_space, bvh] = tracers(&indirect, settings);
         let upsampling = upsampling(&indirect, settings);
+        let [splatting, gathering] = estimates(&indirect, settings);
         Self {
             stages: vec![
                 stage(Stage::GBufferCapture, always("every view")),
@@ -111,7 +116,9 @@ impl Plan {
                 stage(Stage::PhotonEmitter, indirect.clone()),
                 stage(Stage::ImageSpaceTracer, image_space),
                 stage(Stage::BvhTracer, bvh),
-                stage(Stage::PhotonSplatter, indirect),
+                stage(Stage::EnvMapLighting, gathering.clone()),
+                stage(Stage::PhotonSplatter, splatting),
+                stage(Stage::FinalGather, gathering),
                 stage(Stage::Upsampler, upsampling),
                 stage(Stage::CausticPhotons, (false, caustics)),
                 stage(Stage::Composite, always("every view")),
@@ -155,7 +162,7 @@ fn map_stages(indirect: &(bool, String), settings: &Settings) -> [(bool, String)
     if !indirect.0 {
         return [(); 3].map(|()| indirect.clone());
     }
-    if !settings.tracer_kind.uses_env_maps() {
+    if !settings.needs_env_maps() {
         return ["rays meet triangles"; 3].map(|reason| (false, reason.to_owned()));
     }
     let (most, size) = (settings.env_map_count, settings.env_map_size);
@@ -181,6 +188,24 @@ fn importance(indirect: &(bool, String), settings: &Settings) -> (bool, String) 
         (true, false) => (false, "settings spread photons evenly".to_owned()),
         (true, true) => (true, "photons start where paths were seen".to_owned()),
     }
+}
+
+/// From photons to pixels: the photons around, or rays to lit environment maps.
+fn estimates(indirect: &(bool, String), settings: &Settings) -> [(bool, String); 2] {
+    if !indirect.0 {
+        return [indirect.clone(), indirect.clone()];
+    }
+    let [splatting, gathering] = match settings.indirect_method {
+        IndirectMethod::Splatting => [indirect.clone(), (false, "settings take the photons around".to_owned())],
+        IndirectMethod::FinalGather => {
+            let rays = format!("{} rays a pixel", settings.final_gather.rays);
+            [
+                (false, "settings gather from lit environment maps".to_owned()),
+                (true, rays),
+            ]
+        }
+    };
+    [splatting, gathering]
 }
 
 /// The tracer in image space, and that of triangles.

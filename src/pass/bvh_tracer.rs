@@ -10,7 +10,7 @@ use super::dispatch_64;
 use super::photon_walk::{PhotonWalk, PhotonWalkInputs, PhotonWalkResources, SharedHop};
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::bvh_geometry::BVH_SLOTS;
-use crate::resource::{BvhGeometry, Photons, Rays};
+use crate::resource::{BvhGeometry, Photons, Rays, SurfaceRays};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -25,7 +25,7 @@ pub(crate) mod gpu {
     }
 }
 
-/// Bindings of group 0 of `shaders/pass/bvh_tracer/trace_rays.wgsl`, in order.
+/// Bindings of group 0 of `shaders/pass/bvh_tracer/trace_rays.wgsl` and `trace_surface_rays.wgsl`, in order.
 pub(crate) const RAY_SLOTS: [Slot; 3] = [Slot::Uniform, Slot::Storage, Slot::StorageMut];
 
 /// Bindings of group 2 of `shaders/pass/bvh_tracer/walk_lost.wgsl`.
@@ -53,6 +53,7 @@ pub struct BvhTracer {
     walk_lost: wgpu::ComputePipeline,
     /// By [`RayQuery`].
     traces: [wgpu::ComputePipeline; 2],
+    trace_surface_rays: wgpu::ComputePipeline,
 }
 
 /// Uniforms and bind groups.
@@ -61,6 +62,8 @@ pub struct BvhTracerResources {
     walk: PhotonWalkResources,
     ray_params: wgpu::Buffer,
     ray_groups: BindGroupCache,
+    surface_ray_params: wgpu::Buffer,
+    surface_ray_groups: BindGroupCache,
     geometry_groups: BindGroupCache,
     lost_groups: BindGroupCache,
 }
@@ -95,6 +98,19 @@ pub struct BvhTracerRayInputs<'a> {
     pub rays: &'a Rays,
     /// What is asked of them.
     pub query: RayQuery,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+/// What a frame gives it for a list of rays that leave surfaces.
+#[derive(Debug, Clone, Copy)]
+pub struct BvhTracerSurfaceRayInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// What rays meet, of the instances that environment maps see; prepared for this frame.
+    pub geometry: &'a BvhGeometry,
+    /// Rays are read, what becomes of them is written: none is lost or tentative.
+    pub rays: &'a SurfaceRays,
     /// Sink for GPU time.
     pub timestamps: Option<&'a Timestamps>,
 }
@@ -143,6 +159,12 @@ impl BvhTracer {
                 &[&photon_walk.layout, &geometry_layout, &lost_layout],
             ),
             traces: ["trace_closest", "trace_any"].map(trace),
+            trace_surface_rays: pipeline(
+                "lightfall::BvhTracer::trace_surface_rays",
+                wgsl::BVH_TRACER_SURFACE_RAYS,
+                "trace_surface_rays",
+                &[&ray_layout, &geometry_layout],
+            ),
             photon_walk,
             ray_layout,
             geometry_layout,
@@ -217,6 +239,37 @@ impl BvhTracer {
         pass.dispatch_workgroups(groups[0], groups[1], 1);
     }
 
+    /// Records the tracing of a list of rays that leave surfaces, as [`ImageSpaceTracer`](super::ImageSpaceTracer) does.
+    pub fn record_surface_rays(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut BvhTracerResources,
+        inputs: &BvhTracerSurfaceRayInputs<'_>,
+    ) {
+        let (groups, row) = dispatch_64(inputs.rays.count());
+        let params = gpu::Params {
+            ray_count: inputs.rays.count(),
+            row,
+        };
+        inputs
+            .queue
+            .write_buffer(&resources.surface_ray_params, 0, bytemuck::bytes_of(&params));
+        let label = "lightfall::BvhTracer::surface_rays";
+        let bound = [
+            (&resources.surface_ray_params).into(),
+            inputs.rays.buffer().into(),
+            inputs.rays.hits().into(),
+        ];
+        let cache = &mut resources.surface_ray_groups;
+        let rays = cache.get(&self.device, label, &self.ray_layout, &bound);
+        let geometry = self.geometry_group(resources, inputs.geometry);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(&self.trace_surface_rays);
+        pass.set_bind_group(0, &rays, &[]);
+        pass.set_bind_group(1, &geometry, &[]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
+    }
+
     fn geometry_group(&self, resources: &mut BvhTracerResources, geometry: &BvhGeometry) -> wgpu::BindGroup {
         let label = "lightfall::BvhTracer::geometry";
         let (groups, layout) = (&mut resources.geometry_groups, &self.geometry_layout);
@@ -242,6 +295,11 @@ impl BvhTracerResources {
             walk: PhotonWalkResources::new(device, "lightfall::BvhTracer::walk", bounces)?,
             ray_params: device::uniform_buffer::<gpu::Params>(device, "lightfall::BvhTracer::params")?,
             ray_groups: BindGroupCache::default(),
+            surface_ray_params: device::uniform_buffer::<gpu::Params>(
+                device,
+                "lightfall::BvhTracer::surface_ray_params",
+            )?,
+            surface_ray_groups: BindGroupCache::default(),
             geometry_groups: BindGroupCache::default(),
             lost_groups: BindGroupCache::default(),
         })
@@ -249,6 +307,6 @@ impl BvhTracerResources {
 
     /// Bytes allocated.
     pub fn memory_use(&self) -> u64 {
-        self.walk.memory_use() + self.ray_params.size()
+        self.walk.memory_use() + self.ray_params.size() + self.surface_ray_params.size()
     }
 }

@@ -13,7 +13,9 @@ pub(crate) mod depth_hierarchy_build;
 pub(crate) mod direct_light;
 pub(crate) mod emission_importance;
 mod env_map_capture;
+pub(crate) mod env_map_lighting;
 pub(crate) mod env_map_selector;
+pub(crate) mod final_gather;
 mod full_screen;
 mod g_buffer_capture;
 pub(crate) mod image_space_tracer;
@@ -23,13 +25,16 @@ pub(crate) mod photon_splatter;
 pub(crate) mod photon_walk;
 mod shadow_map_capture;
 pub(crate) mod soft_shadow;
+pub(crate) mod stable_sort;
 pub(crate) mod tone_map;
 pub(crate) mod trace_statistics;
 pub(crate) mod upsampler;
 
 pub use accumulator::{Accumulator, AccumulatorInputs, AccumulatorResources};
 #[cfg(feature = "bvh")]
-pub use bvh_tracer::{BvhTracer, BvhTracerInputs, BvhTracerRayInputs, BvhTracerResources, RayQuery};
+pub use bvh_tracer::{
+    BvhTracer, BvhTracerInputs, BvhTracerRayInputs, BvhTracerResources, BvhTracerSurfaceRayInputs, RayQuery,
+};
 pub use composite::{Composite, CompositeInputs, CompositeResources, CompositeSettings};
 pub use depth_hierarchy_build::{DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources};
 pub use direct_light::{DirectLight, DirectLightInputs, DirectLightResources};
@@ -37,10 +42,12 @@ pub use emission_importance::{
     EmissionImportance, EmissionImportanceInputs, EmissionImportanceResources, EmissionUpdateInputs,
 };
 pub use env_map_capture::{EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources};
+pub use env_map_lighting::{EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources, EnvMapLightingSettings};
 pub use env_map_selector::{
     CoverageMeasure, EnvMapSelector, EnvMapSelectorInputs, EnvMapSelectorResources, EnvMapSelectorSettings,
     MAX_SELECTED, SelectBlockingInputs, Selection, SelectionStep, Sight,
 };
+pub use final_gather::{FinalGather, FinalGatherInputs, FinalGatherResources};
 pub use g_buffer_capture::{GBufferCapture, GBufferCaptureInputs};
 pub use image_space_tracer::{
     ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerRayInputs, ImageSpaceTracerResources,

@@ -5,26 +5,6 @@ struct ListParams {
     row: u32,
 }
 
-// Twin of `resource::SurfaceRay`.
-struct SurfaceRay {
-    position: vec3f,
-    normal: u32,
-    direction: vec3f,
-    pad: u32,
-}
-
-// Twin of `resource::SurfaceHit`.
-struct SurfaceHit {
-    distance: f32,
-    kind: u32,
-    normal: u32,
-    reflectance: u32,
-    fetches: u32,
-    maps: u32,
-    steps: u32,
-    pad: u32,
-}
-
 @group(0) @binding(0) var<uniform> list: ListParams;
 @group(0) @binding(1) var<storage, read> rays: array<SurfaceRay>;
 @group(0) @binding(2) var<storage, read_write> hits: array<SurfaceHit>;

@@ -1,4 +1,4 @@
-// How wide a photon's kernel is. The shape brings `bin_count(bin) -> u32`.
+// How wide a photon's kernel is on the screen. The shape brings `bin_count(bin) -> u32`.
 
 // Bins to each side of a photon's that its density is taken from.
 const BINS_AROUND: i32 = 5;
@@ -33,14 +33,9 @@ fn splat_limit(b: Bandwidth, photon: Photon) -> f32 {
     return max(0.0, b.max_radius * w / g_buffer_pixels_a_length(view));
 }
 
-// Where more photons start than elsewhere, the rule that goes by density narrows their kernels.
-fn splat_narrowing(b: Bandwidth, photon: Photon) -> f32 {
-    return select(1.0, inverseSqrt(photon_boost(photon.state)), b.rule == BANDWIDTH_DENSITY);
-}
-
 // No kernel of this photon is wider.
 fn splat_widest(b: Bandwidth, photon: Photon) -> f32 {
-    return min(b.scale * inverseSqrt(b.lowest) * splat_narrowing(b, photon), splat_limit(b, photon));
+    return min(b.scale * inverseSqrt(b.lowest) * bandwidth_narrowing(b, photon), splat_limit(b, photon));
 }
 
 // Radius of a photon's kernel, unit frame (Yao et al. 2010, section 6, made dimensionless by area and pdf); 0 where nothing
@@ -49,12 +44,10 @@ fn splat_radius(b: Bandwidth, photon: Photon) -> f32 {
     if !photon_is_splatted(photon.state) {
         return 0.0;
     }
-    var h = b.scale;
-    if b.rule == BANDWIDTH_DENSITY {
-        h *= inverseSqrt(clamp(photon.density / b.uniform_density, b.lowest, b.highest));
-    } else if b.rule == BANDWIDTH_BIN {
+    var h = bandwidth_radius(b, photon);
+    if b.rule == BANDWIDTH_BIN {
         h *= inverseSqrt(clamp(bin_density(b, photon) / b.uniform_count, b.lowest, b.highest));
     }
-    h = min(h * splat_narrowing(b, photon), splat_limit(b, photon));
+    h = min(h, splat_limit(b, photon));
     return select(0.0, h, h > 0.0);
 }

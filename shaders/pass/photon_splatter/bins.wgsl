@@ -1,24 +1,4 @@
-// The bins of the screen that photons are counted in, and the uniform that says how wide their kernels are.
-
-struct Bandwidth {
-    // h = scale / sqrt(p), p the density over the uniform one, clamped to [lowest, highest]
-    scale: f32,
-    lowest: f32,
-    highest: f32,
-    // Of one photon of a hop, per area; of all photons
-    uniform_density: f32,
-    uniform_count: f32,
-    // BANDWIDTH_...
-    rule: u32,
-    // Largest radius in pixels of the G-buffer
-    max_radius: f32,
-    // Pixels of the G-buffer for each one of the irradiance, along each axis
-    factor: u32,
-}
-
-const BANDWIDTH_FIXED: u32 = 0u;
-const BANDWIDTH_DENSITY: u32 = 1u;
-const BANDWIDTH_BIN: u32 = 2u;
+// The bins of the screen that photons are counted in.
 
 // Pixels of the irradiance along a bin's side. Twin of `BIN`.
 const BIN: u32 = 1u;

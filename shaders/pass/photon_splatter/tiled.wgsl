@@ -78,7 +78,7 @@ fn find_bins(@builtin(global_invocation_id) id: vec3u) {
     slots[index] = index;
 }
 
-// Where the photons of each bin begin, once they are sorted: the first whose bin is no lower. One invocation a bin, and one
+// Where the photons of each bin begin, once they are sorted. One invocation a bin, and one
 // for where those of the last end.
 @compute @workgroup_size(64)
 fn find_first(
@@ -90,17 +90,7 @@ fn find_first(
     if bin > bin_total() {
         return;
     }
-    var low = 0u;
-    var high = params.slot_count;
-    while low < high {
-        let middle = (low + high) / 2u;
-        if keys[middle] < bin {
-            low = middle + 1u;
-        } else {
-            high = middle;
-        }
-    }
-    first_splats[bin] = low;
+    first_splats[bin] = first_of_key(bin, params.slot_count);
 }
 
 fn bin_count(bin: u32) -> u32 {
@@ -127,16 +117,7 @@ fn prepare_splats(@builtin(global_invocation_id) id: vec3u) {
         splats[index] = splat_nothing();
         return;
     }
-    var bits = bitcast<u32>(1.0 / (h * h));
-    if splat_keeps_to_surfaces {
-        // Radii of eight digits, rounded down; flux is spread over what they are then.
-        bits = (bits + SPLAT_SURFACE_BITS) & ~SPLAT_SURFACE_BITS;
-    }
-    let inverse = bitcast<f32>(bits);
-    if splat_keeps_to_surfaces {
-        bits |= photon_surface(photon.light_and_surface);
-    }
-    splats[index] = Splat(photon.position, bits, photon.flux * inverse, photon.normal);
+    splats[index] = splat_record(photon, h);
     // A step of slack for rounding.
     let steps = u32(ceil(f32(REACH_STEPS) * beyond)) + 1u;
     atomicMax(&reach[keys[index]], steps);

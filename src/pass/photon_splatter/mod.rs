@@ -10,7 +10,6 @@
 //! at most `max_radius` pixels wide; what hangs over a rim is made up for where the image shows the rim.
 
 pub(crate) mod raster;
-pub(crate) mod sort;
 pub(crate) mod tiled;
 
 use crate::gpu::{self as device, BindGroupCache, Bound, ComputeSpec, Slot, TextureSpec};
@@ -24,7 +23,7 @@ use tiled::{Tiled, TiledBuffers};
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
-    /// Twin of `Bandwidth` in `shaders/pass/photon_splatter/bandwidth.wgsl`.
+    /// Twin of `Bandwidth` in `shaders/common/bandwidth.wgsl`.
     #[derive(Debug, Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
     pub(crate) struct Bandwidth {
@@ -606,8 +605,16 @@ fn is_corrected(settings: &PhotonSplatterSettings) -> u32 {
     u32::from(settings.boundary == BoundaryCorrection::KernelArea)
 }
 
+/// Bytes of a photon as it is added up.
+pub(super) const SPLAT_BYTES: u64 = size_of::<tiled::gpu::Splat>() as u64;
+
+/// Whether so many can be added up.
+pub(super) fn check_splats(device: &wgpu::Device, slots: u32) -> Result<(), Error> {
+    TiledBuffers::check(device, slots)
+}
+
 /// All slots but hop 0.
-fn splatted_slots(photons: &Photons) -> u32 {
+pub(super) fn splatted_slots(photons: &Photons) -> u32 {
     let slots = photons.slots() - photons.count();
     debug_assert!(photons.buffer().size() >= u64::from(photons.slots()) * PHOTON_BYTES);
     slots
@@ -624,29 +631,41 @@ fn bin_total(size: [u32; 2]) -> u32 {
 
 fn bandwidth(inputs: &PhotonSplatterInputs<'_>) -> gpu::Bandwidth {
     let (settings, factor) = (inputs.settings, inputs.subsampling.factor());
-    let emitted = inputs.photons.count().max(1) as f32;
+    let (free, _) = free_bandwidth(settings.bandwidth, inputs.photons.count(), (inputs.area, inputs.radius));
+    gpu::Bandwidth {
+        scale: free.scale * settings.radius_scale,
+        max_radius: settings.max_radius.clamp(0.0, LARGEST_RADIUS) * factor as f32,
+        factor,
+        ..free
+    }
+}
+
+/// Radii of `count` photons on surfaces of some area in a region of some radius, without regard to a view; and the widest.
+pub(super) fn free_bandwidth(bandwidth: Bandwidth, count: u32, (area, radius): (f32, f32)) -> (gpu::Bandwidth, f32) {
+    let emitted = count.max(1) as f32;
     // Twins of `BANDWIDTH_…`.
-    let (rule, clamp) = match settings.bandwidth {
+    let (rule, clamp) = match bandwidth {
         Bandwidth::Fixed(_) => (0, [1.0; 2]),
         Bandwidth::Density { clamp, .. } => (1, clamp),
         Bandwidth::Screen { clamp, .. } => (2, clamp),
     };
-    let scale = match settings.bandwidth {
-        Bandwidth::Fixed(share) => share * inputs.radius,
+    let scale = match bandwidth {
+        Bandwidth::Fixed(share) => share * radius,
         Bandwidth::Density { photons, .. } | Bandwidth::Screen { photons, .. } => {
-            (photons * inputs.area / (std::f32::consts::PI * emitted)).sqrt()
+            (photons * area / (std::f32::consts::PI * emitted)).sqrt()
         }
     };
-    gpu::Bandwidth {
-        scale: scale * settings.radius_scale,
+    let uniform = gpu::Bandwidth {
+        scale,
         lowest: clamp[0],
         highest: clamp[1],
-        uniform_density: 1.0 / inputs.area,
-        uniform_count: emitted / inputs.area,
+        uniform_density: 1.0 / area,
+        uniform_count: emitted / area,
         rule,
-        max_radius: settings.max_radius.clamp(0.0, LARGEST_RADIUS) * factor as f32,
-        factor,
-    }
+        max_radius: f32::MAX,
+        factor: 1,
+    };
+    (uniform, scale / clamp[0].sqrt())
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! The tiled shape: photons sorted into bins of the screen, and gathered by pixels.
 
-use super::sort::{SortBuffers, StableSort};
 use super::{MarkedSplatInputs, PhotonSplatterInputs, bin_total, gpu as shared, is_corrected, splatted_slots};
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::pass::dispatch_64;
+use crate::pass::stable_sort::{Side, SortBuffers, StableSort};
 use crate::resource::Subsampling;
 use crate::{Error, wgsl};
 
@@ -11,7 +11,7 @@ pub(crate) mod gpu {
     use super::shared::Bandwidth;
     use bytemuck::{Pod, Zeroable};
 
-    /// Twin of `TiledParams` in `shaders/pass/photon_splatter/tiled_splat.wgsl`.
+    /// Twin of `TiledParams` in `shaders/pass/photon_splatter/tiled_params.wgsl`.
     #[derive(Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
     pub(crate) struct TiledParams {
@@ -31,7 +31,7 @@ pub(crate) mod gpu {
         pub(crate) sample_offset: u32,
     }
 
-    /// Twin of `Splat`.
+    /// Twin of `Splat` in `shaders/common/splat_record.wgsl`.
     #[derive(Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
     pub(crate) struct Splat {
@@ -206,7 +206,7 @@ impl Tiled {
         encoder.clear_buffer(&buffers.reach, 0, None);
         let view = inputs.g_buffer.view_buffer();
         let label = "lightfall::PhotonSplatter";
-        let group = |groups: &mut BindGroupCache, side: &super::sort::Side| {
+        let group = |groups: &mut BindGroupCache, side: &Side| {
             let bound = [
                 (&buffers.params).into(),
                 view.into(),

@@ -1,4 +1,4 @@
-//! The stable sort that puts photons into the order of their bins.
+//! A stable sort of keys with values, such as photons by the bins that they lie in.
 
 use crate::Error;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
@@ -7,7 +7,7 @@ use crate::wgsl;
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
-    /// Twin of `SortParams` in `shaders/pass/photon_splatter/sort.wgsl`.
+    /// Twin of `SortParams` in `shaders/pass/stable_sort.wgsl`.
     #[derive(Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
     pub(crate) struct SortParams {
@@ -18,7 +18,7 @@ pub(crate) mod gpu {
     }
 }
 
-/// Bindings of `shaders/pass/photon_splatter/sort.wgsl`, in order.
+/// Bindings of `shaders/pass/stable_sort.wgsl`, in order.
 pub(crate) const SORT_SLOTS: [Slot; 7] = [
     Slot::Uniform,
     Slot::Storage,
@@ -38,7 +38,7 @@ const DIGITS: u32 = 1 << DIGIT_BITS;
 
 /// Its pipelines.
 #[derive(Debug)]
-pub(super) struct StableSort {
+pub(crate) struct StableSort {
     layout: wgpu::BindGroupLayout,
     count: wgpu::ComputePipeline,
     sum: wgpu::ComputePipeline,
@@ -47,7 +47,7 @@ pub(super) struct StableSort {
 
 /// Keys, values, and what is counted of them.
 #[derive(Debug)]
-pub(super) struct SortBuffers {
+pub(crate) struct SortBuffers {
     /// Each pass reads one side and writes the other.
     sides: [Side; 2],
     counts: wgpu::Buffer,
@@ -58,16 +58,16 @@ pub(super) struct SortBuffers {
 }
 
 #[derive(Debug)]
-pub(super) struct Side {
-    pub(super) keys: wgpu::Buffer,
-    pub(super) values: wgpu::Buffer,
+pub(crate) struct Side {
+    pub(crate) keys: wgpu::Buffer,
+    pub(crate) values: wgpu::Buffer,
 }
 
 impl StableSort {
-    pub(super) fn new(device: &wgpu::Device) -> Self {
+    pub(crate) fn new(device: &wgpu::Device) -> Self {
         let layout = device::layout(
             device,
-            "lightfall::PhotonSplatter::sort",
+            "lightfall::StableSort",
             wgpu::ShaderStages::COMPUTE,
             &SORT_SLOTS,
         );
@@ -76,7 +76,7 @@ impl StableSort {
                 device,
                 &ComputeSpec {
                     label,
-                    source: wgsl::PHOTON_SPLATTER_SORT,
+                    source: wgsl::STABLE_SORT,
                     entry_point,
                     layouts: &[&layout],
                     constants: &[],
@@ -84,15 +84,15 @@ impl StableSort {
             )
         };
         Self {
-            count: pipeline("lightfall::PhotonSplatter::sort count", "count_digits"),
-            sum: pipeline("lightfall::PhotonSplatter::sort sum", "sum_digits"),
-            place: pipeline("lightfall::PhotonSplatter::sort place", "place_keys"),
+            count: pipeline("lightfall::StableSort count", "count_digits"),
+            sum: pipeline("lightfall::StableSort sum", "sum_digits"),
+            place: pipeline("lightfall::StableSort place", "place_keys"),
             layout,
         }
     }
 
     /// Sorts the first `count` keys of the side to sort, into the sorted side.
-    pub(super) fn record(
+    pub(crate) fn record(
         &self,
         device: &wgpu::Device,
         queue: &wgpu::Queue,
@@ -123,7 +123,7 @@ impl StableSort {
                 (&buffers.counts).into(),
                 (&buffers.totals).into(),
             ];
-            let label = "lightfall::PhotonSplatter::sort";
+            let label = "lightfall::StableSort";
             let group = buffers.groups.get(device, label, &self.layout, &bound);
             pass.set_bind_group(0, &group, &[]);
             let steps = [(&self.count, [x, y]), (&self.sum, [1, 1]), (&self.place, [x, y])];
@@ -137,46 +137,46 @@ impl StableSort {
 
 impl SortBuffers {
     /// Bytes to sort so many keys.
-    pub(super) fn size_in_bytes(count: u32, largest_key: u32) -> u64 {
+    pub(crate) fn size_in_bytes(count: u32, largest_key: u32) -> u64 {
         let [keys, counts] = Self::sizes(count);
         4 * keys + counts + 4 * u64::from(DIGITS) + u64::from(passes(largest_key)) * size_of::<gpu::SortParams>() as u64
     }
 
     /// Of the keys, and of what is counted of them by digit and block.
-    pub(super) fn sizes(count: u32) -> [u64; 2] {
+    pub(crate) fn sizes(count: u32) -> [u64; 2] {
         [
             4 * u64::from(count.max(1)),
             4 * u64::from(DIGITS) * u64::from(count.div_ceil(BLOCK).max(1)),
         ]
     }
 
-    pub(super) fn new(device: &wgpu::Device, count: u32, largest_key: u32) -> Result<Self, Error> {
+    pub(crate) fn new(device: &wgpu::Device, count: u32, largest_key: u32) -> Result<Self, Error> {
         let [keys, counts] = Self::sizes(count);
         let buffer = |label, bytes| device::buffer(device, label, bytes, wgpu::BufferUsages::STORAGE);
         let side = || {
             Ok::<_, Error>(Side {
-                keys: buffer("lightfall::PhotonSplatter::keys", keys)?,
-                values: buffer("lightfall::PhotonSplatter::values", keys)?,
+                keys: buffer("lightfall::StableSort::keys", keys)?,
+                values: buffer("lightfall::StableSort::values", keys)?,
             })
         };
-        let params = |_| device::uniform_buffer::<gpu::SortParams>(device, "lightfall::PhotonSplatter::sort_params");
+        let params = |_| device::uniform_buffer::<gpu::SortParams>(device, "lightfall::StableSort_params");
         let passes = passes(largest_key);
         Ok(Self {
             sides: [side()?, side()?],
-            counts: buffer("lightfall::PhotonSplatter::digit_counts", counts)?,
-            totals: buffer("lightfall::PhotonSplatter::digit_totals", 4 * u64::from(DIGITS))?,
+            counts: buffer("lightfall::StableSort::digit_counts", counts)?,
+            totals: buffer("lightfall::StableSort::digit_totals", 4 * u64::from(DIGITS))?,
             params: (0..passes).map(params).collect::<Result<_, _>>()?,
             groups: BindGroupCache::for_uses(passes as usize),
         })
     }
 
     /// Where keys and values are written before the sort.
-    pub(super) fn unsorted(&self) -> &Side {
+    pub(crate) fn unsorted(&self) -> &Side {
         &self.sides[0]
     }
 
     /// Where they are after it.
-    pub(super) fn sorted(&self) -> &Side {
+    pub(crate) fn sorted(&self) -> &Side {
         &self.sides[self.params.len() % 2]
     }
 }

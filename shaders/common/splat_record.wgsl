@@ -1,21 +1,8 @@
-// What the steps of the tiled shape share.
-
-struct TiledParams {
-    bandwidth: Bandwidth,
-    // Slots of the photon buffer to read: from, how many
-    first_slot: u32,
-    slot_count: u32,
-    // Invocations in a row of the dispatch
-    row: u32,
-}
+// A photon as it is added up.
 
 // Bits of a splat's radius that number its surface, where photons keep to surfaces.
 const SPLAT_SURFACE_BITS: u32 = 0xffffu;
 
-// Parts of a pixel that reach is counted in.
-const REACH_STEPS: u32 = 16u;
-
-// A photon ready to be added up.
 struct Splat {
     position: vec3f,
     // Bits of one over the squared radius; where photons keep to surfaces, the last sixteen are the surface's number
@@ -35,4 +22,18 @@ fn splat_inverse(splat: Splat) -> f32 {
 // One that reaches no receiver.
 fn splat_nothing() -> Splat {
     return Splat(vec3f(0.0), bitcast<u32>(0x1p100f), vec3f(0.0), 0u);
+}
+
+// A photon under a kernel of radius h.
+fn splat_record(photon: Photon, h: f32) -> Splat {
+    var bits = bitcast<u32>(1.0 / (h * h));
+    if splat_keeps_to_surfaces {
+        // Radii of eight digits, rounded down; flux is spread over what they are then.
+        bits = (bits + SPLAT_SURFACE_BITS) & ~SPLAT_SURFACE_BITS;
+    }
+    let inverse = bitcast<f32>(bits);
+    if splat_keeps_to_surfaces {
+        bits |= photon_surface(photon.light_and_surface);
+    }
+    return Splat(photon.position, bits, photon.flux * inverse, photon.normal);
 }

@@ -1,17 +1,5 @@
-// A point that irradiance is estimated at, as one texel: the bits of its depth, its geometric normal, octahedral, and the
-// number of its surface. The module brings `view`.
-
-struct Receiver {
-    position: vec3f,
-    normal: vec3f,
-    // 0: none in particular
-    surface: u32,
-    is_seen: bool,
-}
-
-fn receiver_nowhere() -> Receiver {
-    return Receiver(vec3f(0.0), vec3f(0.0), 0u, false);
-}
+// A receiver as one texel: the bits of its depth, its geometric normal, octahedral, and the number of its surface. The module
+// brings `view`.
 
 fn receiver_pack(receiver: Receiver, depth: f32) -> vec4u {
     return vec4u(bitcast<u32>(depth), octahedral_pack(receiver.normal), receiver.surface, u32(receiver.is_seen));

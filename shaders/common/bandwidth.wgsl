@@ -1,0 +1,36 @@
+// How wide kernels are: the uniform that says it, and what of it does not hang on a view.
+
+struct Bandwidth {
+    // h = scale / sqrt(p), p the density over the uniform one, clamped to [lowest, highest]
+    scale: f32,
+    lowest: f32,
+    highest: f32,
+    // Of one photon of a hop, per area; of all photons
+    uniform_density: f32,
+    uniform_count: f32,
+    // BANDWIDTH_...
+    rule: u32,
+    // Largest radius in pixels of the G-buffer
+    max_radius: f32,
+    // Pixels of the G-buffer for each one of the irradiance, along each axis
+    factor: u32,
+}
+
+const BANDWIDTH_FIXED: u32 = 0u;
+const BANDWIDTH_DENSITY: u32 = 1u;
+const BANDWIDTH_BIN: u32 = 2u;
+
+// Where more photons start than elsewhere, the rule that goes by density narrows their kernels.
+fn bandwidth_narrowing(b: Bandwidth, photon: Photon) -> f32 {
+    return select(1.0, inverseSqrt(photon_boost(photon.state)), b.rule == BANDWIDTH_DENSITY);
+}
+
+// Radius of a photon's kernel, unit frame (Yao et al. 2010, section 6, made dimensionless by area and pdf); by BANDWIDTH_BIN that
+// of a photon of uniform density.
+fn bandwidth_radius(b: Bandwidth, photon: Photon) -> f32 {
+    if b.rule != BANDWIDTH_DENSITY {
+        return b.scale;
+    }
+    let density = clamp(photon.density / b.uniform_density, b.lowest, b.highest);
+    return b.scale * inverseSqrt(density) * bandwidth_narrowing(b, photon);
+}

@@ -1,0 +1,339 @@
+//! What a view has of indirect light: the estimate at a part of its pixels, and the levels from there to all of them.
+
+use super::indirect_scene::{IndirectScene, PhotonPasses};
+use super::{IndirectMethod, Settings, Upsampling, ViewInputs};
+use crate::Error;
+#[cfg(feature = "bvh")]
+use crate::pass::{BvhTracerResources, BvhTracerSurfaceRayInputs};
+use crate::pass::{
+    EmissionImportanceInputs, EmissionImportanceResources, FinalGather, FinalGatherInputs, FinalGatherResources,
+    ImageSpaceTracerRayInputs, ImageSpaceTracerResources, MarkedSplatInputs, PhotonSplatter, PhotonSplatterInputs,
+    PhotonSplatterResources, PhotonSplatterSettings, SplatShape, Upsampler, UpsamplerInputs, UpsamplerResources,
+    progressive_scale,
+};
+use crate::resource::{GBuffer, Irradiance, Lights, MarkedPixels, Photons, Subsampling, SurfaceRays};
+
+/// From photons to the pixels of a view.
+#[derive(Debug)]
+pub(super) struct ViewPasses {
+    photon_splatter: PhotonSplatter,
+    /// If the settings gather.
+    final_gather: Option<FinalGather>,
+    upsampler: Upsampler,
+}
+
+/// Allocated while there is indirect light.
+#[derive(Debug)]
+pub(super) struct IndirectView {
+    estimate: Estimate,
+    estimated: Irradiance,
+    /// If photons start where they count.
+    importance: Option<EmissionImportanceResources>,
+    /// From coarse to fine, while fewer pixels are estimated than seen.
+    levels: Vec<UpsampledLevel>,
+}
+
+/// By [`IndirectMethod`].
+#[derive(Debug)]
+enum Estimate {
+    Splatting(Box<PhotonSplatterResources>),
+    FinalGather(Box<GatherView>),
+}
+
+#[derive(Debug)]
+struct GatherView {
+    rays: SurfaceRays,
+    own: FinalGatherResources,
+    image_space: ImageSpaceTracerResources,
+    #[cfg(feature = "bvh")]
+    bvh: BvhTracerResources,
+}
+
+/// Irradiance made of that of the level before.
+#[derive(Debug)]
+struct UpsampledLevel {
+    subsampling: Subsampling,
+    irradiance: Irradiance,
+    upsampler: UpsamplerResources,
+    /// What is estimated anew.
+    marked: Option<MarkedPixels>,
+}
+
+/// What recording needs beside a host's inputs.
+#[derive(Clone, Copy)]
+pub(super) struct IndirectViewInputs<'a> {
+    pub(super) view: &'a ViewInputs<'a>,
+    pub(super) settings: &'a Settings,
+    pub(super) passes: (&'a ViewPasses, &'a PhotonPasses),
+    pub(super) scene: &'a IndirectScene,
+    pub(super) lights: &'a Lights,
+    pub(super) g_buffer: &'a GBuffer,
+    /// Of all surfaces, unit frame.
+    pub(super) area: f32,
+    /// Of the region, unit frame.
+    pub(super) radius: f32,
+    /// Of the photons.
+    pub(super) sample_offset: u32,
+    /// Whether what is seen of photons counts for where the next ones start.
+    pub(super) counts_emission: bool,
+}
+
+impl ViewPasses {
+    pub(super) fn new(device: &wgpu::Device, settings: &Settings) -> Result<Self, Error> {
+        let gathers = settings.indirect_method == IndirectMethod::FinalGather;
+        Ok(Self {
+            photon_splatter: PhotonSplatter::new(device, &settings.splatter_config)?,
+            final_gather: gathers.then(|| FinalGather::new(device)),
+            upsampler: Upsampler::new(device),
+        })
+    }
+}
+
+impl IndirectView {
+    pub(super) fn new(
+        device: &wgpu::Device,
+        settings: &Settings,
+        photons: &Photons,
+        size: [u32; 2],
+    ) -> Result<Self, Error> {
+        let config = &settings.splatter_config;
+        let estimated = settings.subsampling.size(size);
+        let splats = settings.indirect_method == IndirectMethod::Splatting;
+        let estimate = if splats {
+            Estimate::Splatting(Box::new(PhotonSplatterResources::new(
+                device, config, photons, estimated,
+            )?))
+        } else {
+            Estimate::FinalGather(Box::new(GatherView::new(device, settings, estimated)?))
+        };
+        let estimated = Irradiance::new(device, estimated, wgpu::TextureFormat::Rgba32Float)?;
+        let by_levels = settings.upsampling == Upsampling::ByLevels;
+        let mut levels = Vec::new();
+        let mut finer = settings.subsampling.finer();
+        while let Some(subsampling) = finer {
+            finer = subsampling.finer();
+            if by_levels || finer.is_none() {
+                let is_marked = by_levels && splats && config.shape == SplatShape::Tiled;
+                levels.push(UpsampledLevel::new(device, subsampling, size, is_marked)?);
+            }
+        }
+        let importance = (settings.emission_importance > 0.0).then(|| EmissionImportanceResources::new(device));
+        Ok(Self {
+            estimate,
+            estimated,
+            importance: importance.transpose()?,
+            levels,
+        })
+    }
+
+    /// At all pixels.
+    pub(super) fn irradiance(&self) -> &Irradiance {
+        self.levels.last().map_or(&self.estimated, |l| &l.irradiance)
+    }
+
+    /// What was estimated anew at each level, from coarse to fine.
+    pub(super) fn marked_pixels(&self) -> impl Iterator<Item = &MarkedPixels> {
+        self.levels.iter().filter_map(|l| l.marked.as_ref())
+    }
+
+    /// Records the estimate, the levels up to all pixels, and what counts for the next photons.
+    pub(super) fn record(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        inputs: &IndirectViewInputs<'_>,
+    ) -> Result<(), Error> {
+        match &mut self.estimate {
+            Estimate::Splatting(own) => splat(encoder, own, &self.estimated, inputs),
+            Estimate::FinalGather(own) => own.record(encoder, &self.estimated, inputs)?,
+        }
+        self.upsample(encoder, inputs);
+        self.count_emission(encoder, inputs);
+        Ok(())
+    }
+
+    /// Records the levels between the pixels that were estimated and all of them.
+    fn upsample(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &IndirectViewInputs<'_>) {
+        let (passes, view) = (inputs.passes.0, inputs.view);
+        let (mut coarse, mut subsampling) = (&self.estimated, inputs.settings.subsampling);
+        for level in &mut self.levels {
+            let upsampler_inputs = UpsamplerInputs {
+                queue: view.queue,
+                g_buffer: inputs.g_buffer,
+                coarse,
+                subsampling,
+                target: level.subsampling,
+                irradiance: &level.irradiance,
+                marked: level.marked.as_ref(),
+                settings: &inputs.settings.upsampler,
+                timestamps: view.timestamps,
+            };
+            passes
+                .upsampler
+                .record(encoder, &mut level.upsampler, &upsampler_inputs);
+            if let (Some(marked), Estimate::Splatting(own)) = (&level.marked, &mut self.estimate) {
+                let marked_inputs = MarkedSplatInputs {
+                    queue: view.queue,
+                    g_buffer: inputs.g_buffer,
+                    subsampling: level.subsampling,
+                    irradiance: &level.irradiance,
+                    marked,
+                    timestamps: view.timestamps,
+                };
+                passes.photon_splatter.record_marked(encoder, own, &marked_inputs);
+            }
+            (coarse, subsampling) = (&level.irradiance, level.subsampling);
+        }
+    }
+
+    fn count_emission(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &IndirectViewInputs<'_>) {
+        if let (Some(pass), Some(cells), Some(importance)) = (
+            &inputs.passes.1.emission_importance,
+            inputs.scene.emission_cells(),
+            &mut self.importance,
+        ) && inputs.counts_emission
+        {
+            let importance_inputs = EmissionImportanceInputs {
+                queue: inputs.view.queue,
+                photons: &inputs.scene.photons,
+                lights: inputs.lights,
+                g_buffer: inputs.g_buffer,
+                cells,
+                timestamps: inputs.view.timestamps,
+            };
+            pass.record(encoder, importance, &importance_inputs);
+        }
+    }
+
+    /// Bytes by resource.
+    pub(super) fn memory_by_resource(&self) -> Vec<(&'static str, u64)> {
+        let mut list = vec![("indirect_irradiance", self.estimated.memory_use())];
+        list.push(match &self.estimate {
+            Estimate::Splatting(own) => ("splatter", own.memory_use()),
+            Estimate::FinalGather(own) => ("final_gather", own.memory_use()),
+        });
+        if let Some(importance) = &self.importance {
+            list.push(("emission_importance", importance.memory_use()));
+        }
+        if !self.levels.is_empty() {
+            let levels = self.levels.iter().map(UpsampledLevel::memory_use);
+            list.push(("upsampled_irradiance", levels.sum()));
+        }
+        list
+    }
+}
+
+/// Records the estimate of photons around.
+fn splat(
+    encoder: &mut wgpu::CommandEncoder,
+    own: &mut PhotonSplatterResources,
+    estimated: &Irradiance,
+    inputs: &IndirectViewInputs<'_>,
+) {
+    let settings = PhotonSplatterSettings {
+        radius_scale: progressive_scale(inputs.view.accumulated, inputs.settings.radius_alpha),
+        ..inputs.settings.splatter
+    };
+    let splatter_inputs = PhotonSplatterInputs {
+        queue: inputs.view.queue,
+        photons: &inputs.scene.photons,
+        g_buffer: inputs.g_buffer,
+        subsampling: inputs.settings.subsampling,
+        irradiance: estimated,
+        area: inputs.area,
+        radius: inputs.radius,
+        sample_offset: inputs.sample_offset,
+        settings: &settings,
+        timestamps: inputs.view.timestamps,
+    };
+    inputs.passes.0.photon_splatter.record(encoder, own, &splatter_inputs);
+}
+
+impl GatherView {
+    fn new(device: &wgpu::Device, settings: &Settings, size: [u32; 2]) -> Result<Self, Error> {
+        let rays = u64::from(size[0]) * u64::from(size[1]) * u64::from(settings.final_gather.rays);
+        Ok(Self {
+            rays: SurfaceRays::new(device, u32::try_from(rays).unwrap_or(u32::MAX))?,
+            own: FinalGatherResources::new(device)?,
+            image_space: ImageSpaceTracerResources::new(device)?,
+            #[cfg(feature = "bvh")]
+            bvh: BvhTracerResources::new(device)?,
+        })
+    }
+
+    /// Records the rays, what they meet, and what they bring back.
+    fn record(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        estimated: &Irradiance,
+        inputs: &IndirectViewInputs<'_>,
+    ) -> Result<(), Error> {
+        let (Some(pass), Some(env_maps), Some(light)) = (
+            &inputs.passes.0.final_gather,
+            inputs.scene.env_maps(),
+            inputs.scene.env_map_irradiance(),
+        ) else {
+            return Ok(());
+        };
+        let gather_inputs = FinalGatherInputs {
+            queue: inputs.view.queue,
+            g_buffer: inputs.g_buffer,
+            subsampling: inputs.settings.subsampling,
+            rays: &self.rays,
+            env_maps,
+            light,
+            irradiance: estimated,
+            sample_offset: inputs.sample_offset,
+            timestamps: inputs.view.timestamps,
+        };
+        pass.record_rays(encoder, &mut self.own, &gather_inputs);
+        #[cfg(feature = "bvh")]
+        if let (Some(tracer), Some(geometry)) = (&inputs.passes.1.bvh_tracer, inputs.view.bvh) {
+            let ray_inputs = BvhTracerSurfaceRayInputs {
+                queue: inputs.view.queue,
+                geometry,
+                rays: &self.rays,
+                timestamps: inputs.view.timestamps,
+            };
+            tracer.record_surface_rays(encoder, &mut self.bvh, &ray_inputs);
+            pass.record(encoder, &mut self.own, &gather_inputs);
+            return Ok(());
+        }
+        if let Some(tracer) = &inputs.passes.1.image_space_tracer {
+            let ray_inputs = ImageSpaceTracerRayInputs {
+                queue: inputs.view.queue,
+                env_maps,
+                hierarchy: inputs.scene.depth_hierarchy(),
+                rays: &self.rays,
+                settings: &inputs.settings.tracer,
+                timestamps: inputs.view.timestamps,
+            };
+            tracer.record_rays(encoder, &mut self.image_space, &ray_inputs)?;
+        }
+        pass.record(encoder, &mut self.own, &gather_inputs);
+        Ok(())
+    }
+
+    fn memory_use(&self) -> u64 {
+        let tracers = self.image_space.memory_use();
+        #[cfg(feature = "bvh")]
+        let tracers = tracers + self.bvh.memory_use();
+        self.rays.memory_use() + self.own.memory_use() + tracers
+    }
+}
+
+impl UpsampledLevel {
+    fn new(device: &wgpu::Device, subsampling: Subsampling, full: [u32; 2], is_marked: bool) -> Result<Self, Error> {
+        let size = subsampling.size(full);
+        Ok(Self {
+            subsampling,
+            irradiance: Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?,
+            upsampler: UpsamplerResources::new(device)?,
+            marked: is_marked.then(|| MarkedPixels::new(device, size)).transpose()?,
+        })
+    }
+
+    fn memory_use(&self) -> u64 {
+        let marked = self.marked.as_ref().map_or(0, MarkedPixels::memory_use);
+        self.irradiance.memory_use() + self.upsampler.memory_use() + marked
+    }
+}
