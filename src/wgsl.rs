@@ -321,6 +321,7 @@ pub(crate) const ENV_MAP_LIGHTING: &str = compose![
     "common/splat_surfaces.wgsl",
     "common/receiver.wgsl",
     "common/photon.wgsl",
+    "common/light_irradiance.wgsl",
     "common/shadow.wgsl",
     "common/light.wgsl",
     "common/env_map.wgsl",
@@ -373,6 +374,7 @@ pub(crate) const UPSAMPLER: &str = compose![
 
 pub(crate) const DIRECT_LIGHT: &str = compose![
     "pass/direct_light.wgsl",
+    "common/light_irradiance.wgsl",
     "common/shadow.wgsl",
     "common/light.wgsl",
     "common/g_buffer.wgsl",
