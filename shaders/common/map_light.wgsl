@@ -31,12 +31,12 @@ fn map_light_map(p: vec3f, n: vec3f, map_count: u32, map_size: u32) -> u32 {
     return best;
 }
 
-// Irradiance at a point of a surface, unit frame; a: 1 where a map shows it, else 0. Of the four texels of light around it
-// those on the same surface count.
-fn map_light_at(p: vec3f, n: vec3f, map_count: u32, map_size: u32) -> vec4f {
+// Irradiance at a point of a surface, unit frame; 0 where no map shows it. Of the four texels of light around it those on the
+// same surface count.
+fn map_light_at(p: vec3f, n: vec3f, map_count: u32, map_size: u32) -> vec3f {
     let map = map_light_map(p, n, map_count, map_size);
     if map == map_count {
-        return vec4f(0.0);
+        return vec3f(0.0);
     }
     let d = p - centers[map].xyz;
     let size = textureDimensions(map_light).x;
@@ -56,7 +56,7 @@ fn map_light_at(p: vec3f, n: vec3f, map_count: u32, map_size: u32) -> vec4f {
         }
     }
     if sum.a > 0.0 {
-        return vec4f(sum.rgb / sum.a, 1.0);
+        return sum.rgb / sum.a;
     }
-    return textureLoad(map_light, cube_face_texel(point.uv, size), 6u * map + point.face, 0);
+    return textureLoad(map_light, cube_face_texel(point.uv, size), 6u * map + point.face, 0).rgb;
 }

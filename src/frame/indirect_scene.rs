@@ -2,15 +2,15 @@
 
 use super::{IndirectMethod, SceneInputs, Settings, TracerKind};
 use crate::Error;
-#[cfg(feature = "bvh")]
-use crate::pass::{BvhTracer, BvhTracerInputs, BvhTracerResources};
 use crate::pass::{
-    DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EmissionImportance,
+    Bandwidth, DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EmissionImportance,
     EmissionImportanceResources, EmissionUpdateInputs, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources,
     EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources, EnvMapLightingSettings, ImageSpaceTracer,
     ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources,
     SharedHop,
 };
+#[cfg(feature = "bvh")]
+use crate::pass::{BvhTracer, BvhTracerInputs, BvhTracerResources};
 use crate::resource::{
     CaptureView, DepthHierarchy, EmissionCells, EnvMapIrradiance, EnvMaps, Lights, LostRays, Photons, ShadowMaps,
 };
@@ -260,7 +260,10 @@ impl IndirectScene {
                 radius: inputs.radius,
                 sample_offset: inputs.scene.sample_offset,
                 settings: &EnvMapLightingSettings {
-                    bandwidth: inputs.settings.splatter.bandwidth,
+                    bandwidth: Bandwidth::Density {
+                        photons: inputs.settings.final_gather.photons,
+                        clamp: [1.0; 2],
+                    },
                     boundary: inputs.settings.splatter.boundary,
                 },
                 timestamps: inputs.scene.timestamps,

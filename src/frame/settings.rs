@@ -51,17 +51,24 @@ pub enum IndirectMethod {
 }
 
 /// Rays that gather, and what they gather from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FinalGatherSettings {
     /// Rays of a pixel that is estimated, 1 to 4096. Cost grows in proportion; noise falls faster than as the root.
     pub rays: u32,
     /// Texels of light along a face of an environment map, 4 to 8192. Finer resolves shadows, and costs as the square.
     pub map_size: u32,
+    /// Photons under a kernel there, above 0: kernels are all of one width. Fewer are faster and keep more detail; their noise is
+    /// evened out over the rays.
+    pub photons: f32,
 }
 
 impl Default for FinalGatherSettings {
     fn default() -> Self {
-        Self { rays: 64, map_size: 32 }
+        Self {
+            rays: 64,
+            map_size: 32,
+            photons: 50.0,
+        }
     }
 }
 
@@ -464,6 +471,12 @@ const KNOBS: &[Knob] = &[
     field!("final_gather.map_size", "4 to 8192", final_gather.map_size, |v| (4
         ..=8192)
         .contains(&v)),
+    field!(
+        "final_gather.photons",
+        "above 0: photons under a kernel",
+        final_gather.photons,
+        |v: f32| v > 0.0 && v.is_finite()
+    ),
     choice!(
         "splatter.shape",
         "tiled, quads or volumes",

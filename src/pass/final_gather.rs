@@ -7,7 +7,7 @@
 //!
 //! Order: [`FinalGather::record_rays`], the tracer's `record_rays`, [`FinalGather::record`]. Cost: pixels × rays, each traced and
 //! looked up in every map. Limits: the error is noise of few rays, the same every frame while `sample_offset` is; rays that
-//! the tracer loses, or whose end no map shows, count as the others do.
+//! the tracer loses, or whose end no map shows, bring nothing.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::{EnvMapIrradiance, EnvMaps, GBuffer, Irradiance, Subsampling, SurfaceRays};

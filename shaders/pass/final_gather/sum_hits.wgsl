@@ -14,22 +14,20 @@
 
 const LANES: u32 = 64u;
 
-var<workgroup> sums: array<vec4f, LANES>;
+var<workgroup> sums: array<vec3f, LANES>;
 
-// rgb: what a ray brings; a: 1 if that is known.
-fn brought(index: u32) -> vec4f {
+// What a ray brings. What is lost brings nothing, as lost photons do: that rays are lost where others bring light says nothing
+// of what they would have met.
+fn brought(index: u32) -> vec3f {
     let hit = hits[index];
-    if hit.kind == HIT_ESCAPED {
-        return vec4f(0.0, 0.0, 0.0, 1.0);
-    }
     if hit.kind != HIT_SURFACE && hit.kind != HIT_TENTATIVE {
-        return vec4f(0.0);
+        return vec3f(0.0);
     }
     let ray = rays[index];
     let light = map_light_at(
         ray.position + hit.distance * ray.direction, octahedral_unpack(hit.normal), params.map_count, params.map_size,
     );
-    return vec4f(light.rgb * reflectance_unpack(hit.reflectance), light.a);
+    return light * reflectance_unpack(hit.reflectance);
 }
 
 @compute @workgroup_size(64)
@@ -38,7 +36,7 @@ fn sum_hits(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
     let pixel = subsampling_pixel(group.xy, params.factor, view.size) + view.origin;
     let is_seen = textureLoad(base_color_texture, pixel, 0).a > 0.0;
     let first = params.ray_count * (group.y * width + group.x);
-    var sum = vec4f(0.0);
+    var sum = vec3f(0.0);
     for (var i = lane; i < params.ray_count && is_seen; i += LANES) {
         sum += brought(first + i);
     }
@@ -51,7 +49,6 @@ fn sum_hits(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
         workgroupBarrier();
     }
     if lane == 0u {
-        // Rays of which nothing is known count as the others do.
-        textureStore(irradiance, group.xy, vec4f(sums[0].rgb / max(sums[0].a, 1.0), f32(is_seen)));
+        textureStore(irradiance, group.xy, vec4f(sums[0] / max(f32(params.ray_count), 1.0), f32(is_seen)));
     }
 }
