@@ -5,8 +5,8 @@ use crate::gpu::Slot;
 use crate::pass::photon_splatter::{raster, tiled};
 use crate::pass::{
     accumulator, composite, depth_hierarchy_build, direct_light, emission_importance, env_map_lighting,
-    env_map_selector, final_gather, image_space_tracer, nearest_occluder, photon_emitter, photon_splatter, photon_walk,
-    soft_shadow, stable_sort, tone_map, trace_statistics, upsampler,
+    env_map_selector, final_gather, image_space_tracer, irradiance_filter, nearest_occluder, photon_emitter,
+    photon_splatter, photon_walk, soft_shadow, stable_sort, tone_map, trace_statistics, upsampler,
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
@@ -296,6 +296,9 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::FINAL_GATHER_SUM, "Params", final_gather::gpu::Params {
             factor, ray_count, sample_offset, map_count, map_size,
         }),
+        twin!(wgsl::IRRADIANCE_FILTER, "Params", irradiance_filter::gpu::Params {
+            factor, radius, normal_agreement, plane_distance,
+        }),
         twin!(wgsl::STABLE_SORT, "SortParams", stable_sort::gpu::SortParams { count, blocks, shift, row }),
         twin!(wgsl::PHOTON_SPLATTER_QUADS, "RasterParams", raster::gpu::RasterParams {
             bandwidth, clip_scale, clip_shift, first_slot, slot_count, row, _pad,
@@ -458,6 +461,7 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "EnvMapLighting" => vec![&env_map_lighting::LIGHT_SLOTS],
         "FinalGather spread" => vec![&final_gather::SPREAD_SLOTS],
         "FinalGather sum" => vec![&final_gather::SUM_SLOTS],
+        "IrradianceFilter" => vec![&irradiance_filter::SLOTS],
         "DirectLight" => vec![&direct_light::SLOTS, &direct_light::VISIBILITY_SLOTS],
         "NearestOccluder" => vec![&nearest_occluder::SLOTS],
         "SoftShadow test" => vec![&soft_shadow::TEST_SLOTS],

@@ -364,8 +364,17 @@ pub(crate) const FINAL_GATHER_SUM: &str = compose![
     "common/cube_face.wgsl",
 ];
 
+pub(crate) const IRRADIANCE_FILTER: &str = compose![
+    "pass/irradiance_filter.wgsl",
+    "common/bilateral.wgsl",
+    "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
+    "common/octahedral.wgsl",
+];
+
 pub(crate) const UPSAMPLER: &str = compose![
     "pass/upsampler.wgsl",
+    "common/bilateral.wgsl",
     "common/lost_rays.wgsl",
     "common/g_buffer.wgsl",
     "common/subsampling.wgsl",
@@ -537,6 +546,7 @@ pub const MODULES: &[(&str, &str)] = &[
     ("EnvMapLighting", ENV_MAP_LIGHTING),
     ("FinalGather spread", FINAL_GATHER_SPREAD),
     ("FinalGather sum", FINAL_GATHER_SUM),
+    ("IrradianceFilter", IRRADIANCE_FILTER),
     ("Upsampler", UPSAMPLER),
     ("DirectLight", DIRECT_LIGHT),
     ("NearestOccluder", NEAREST_OCCLUDER),

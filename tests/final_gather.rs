@@ -15,7 +15,7 @@ use bench::{Bench, Maps};
 use common::meshes::room;
 use common::statistics::Random;
 use common::{Component, Gpu, assert_no_errors, gpu, mean, offline};
-use lightfall::frame::{GiRenderer, IndirectMethod, Settings, Stage, TracerKind, ViewInputs};
+use lightfall::frame::{FinalGatherSettings, GiRenderer, IndirectMethod, Settings, Stage, TracerKind, ViewInputs};
 use lightfall::glam::{DAffine3, DVec3, Vec3};
 use lightfall::pass::*;
 use lightfall::resource::cube_face::CUBE_FACES;
@@ -287,6 +287,11 @@ fn gathering(tracer_kind: TracerKind) -> Settings {
     Settings {
         tracer_kind,
         indirect_method: IndirectMethod::FinalGather,
+        final_gather: FinalGatherSettings {
+            rays: 64,
+            filter_radius: 1,
+            ..Default::default()
+        },
         photons: 30_000,
         ..Settings::fast()
     }
@@ -342,5 +347,97 @@ fn a_view_that_needs_triangles_and_has_none_is_refused() {
         Error::MissingInput { stage, input, .. } => assert_eq!((stage, input), ("FinalGather", "ViewInputs::bvh")),
         other => panic!("{other:?}"),
     }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn the_filter_keeps_even_light_and_edges_and_evens_out_noise() {
+    let Some(gpu) = gpu() else { return };
+    let mut bench = Bench::new(&gpu, room(DVec3::ONE)).unwrap();
+    let size = [40, 32];
+    let view = camera(&bench, size);
+    let g_buffer = capture(&mut bench, view, size);
+    let Gpu { device, queue, .. } = &gpu;
+    let normals = {
+        // Which wall a pixel sees, by where it lies.
+        let inverse = lightfall::glam::Mat4::from_cols_array_2d(&view.inverse_view_projection);
+        let half = bench.frame.point(DVec3::ONE).x;
+        let eye = Vec3::from_slice(&view.capture.eye[..3]);
+        let wall = move |x: u32, y: u32| {
+            let ndc = |i: u32, n: u32| 2.0 * (i as f32 + 0.5) / n as f32 - 1.0;
+            let toward = inverse.project_point3(Vec3::new(ndc(x, size[0]), -ndc(y, size[1]), 0.5)) - eye;
+            let to_walls = (Vec3::splat(half).copysign(toward) - eye) / toward;
+            to_walls.min_position()
+        };
+        (0..size[0] * size[1])
+            .map(|i| wall(i % size[0], i / size[0]))
+            .collect::<Vec<_>>()
+    };
+    let filtered = |texels: &[[f32; 4]], radius: u32| {
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d {
+                width: size[0],
+                height: size[1],
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba32Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        });
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(16 * size[0]),
+            rows_per_image: None,
+        };
+        queue.write_texture(
+            texture.as_image_copy(),
+            bytemuck::cast_slice(texels),
+            layout,
+            texture.size(),
+        );
+        let estimate = Irradiance::from_view(&texture.create_view(&Default::default())).unwrap();
+        let irradiance = Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float).unwrap();
+        let inputs = IrradianceFilterInputs {
+            queue,
+            g_buffer: &g_buffer,
+            subsampling: Subsampling::Full,
+            estimate: &estimate,
+            irradiance: &irradiance,
+            settings: &IrradianceFilterSettings {
+                radius,
+                normal_agreement: 0.7,
+                plane_distance: 0.5,
+            },
+            timestamps: None,
+        };
+        let mut own = IrradianceFilterResources::new(device).unwrap();
+        let mut encoder = device.create_command_encoder(&Default::default());
+        IrradianceFilter::new(device).record(&mut encoder, &mut own, &inputs);
+        queue.submit([encoder.finish()]);
+        read_rgba32float_blocking(device, queue, irradiance.view().texture()).unwrap()
+    };
+    // Another light on each pair of walls: none crosses an edge.
+    let by_wall: Vec<[f32; 4]> = normals.iter().map(|&axis| [1.0 + axis as f32, 0.5, 0.0, 1.0]).collect();
+    for radius in [0, 1, 3] {
+        for (before, after) in by_wall.iter().zip(filtered(&by_wall, radius)) {
+            assert!((before[0] - after[0]).abs() < 1e-5 && after[3] == 1.0, "{radius}");
+        }
+    }
+    // By its weights, Σw² / (Σw)², it leaves a twentieth of the variance where all pixels around are on one wall.
+    let mut random = Random(11);
+    let noise: Vec<[f32; 4]> = normals
+        .iter()
+        .map(|_| [2.0 * random.unit() as f32, 0.0, 0.0, 1.0])
+        .collect();
+    let variance =
+        |texels: &[[f32; 4]]| texels.iter().map(|t| (f64::from(t[0]) - 1.0).powi(2)).sum::<f64>() / texels.len() as f64;
+    let (before, after) = (variance(&noise), variance(&filtered(&noise, 2)));
+    println!("variance {before:.4}, after the filter {after:.4}");
+    assert_eq!(filtered(&noise, 0), noise);
+    assert!(after < 0.15 * before);
     assert_no_errors(&gpu);
 }

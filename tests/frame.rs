@@ -163,6 +163,8 @@ fn make_and_record_every_pass(device: &wgpu::Device, queue: &wgpu::Queue) {
         settings.tracer_kind = kind;
         settings.trace_method = method;
         settings.indirect_method = indirect_method;
+        settings.final_gather.rays = 16;
+        settings.final_gather.filter_radius = index as u32 % 2;
         settings.emission_importance = 0.5 * (index % 2) as f32;
         // The furnished ones, which take longest, once.
         let names = if index == 0 {

@@ -13,19 +13,26 @@ fn map_light_shows(texel: EnvMapTexel, p: vec3f, n: vec3f, map_size: u32) -> boo
     return texel.surface.distance > 0.0 && is_near && dot(texel.surface.normal, n) >= MAP_LIGHT_AGREEMENT;
 }
 
-// The map that shows a point in most detail; the number of maps if none does.
+// The map that shows a point in most detail. In the tip of a corner, where a texel may show one wall where the point is on
+// another, none may: then the one that would. The number of maps if none looks at its front.
 fn map_light_map(p: vec3f, n: vec3f, map_count: u32, map_size: u32) -> u32 {
     var best = map_count;
     var least = 1e30;
+    var is_shown = false;
     for (var map = 0u; map < map_count; map++) {
         let d = p - centers[map].xyz;
         let distance_squared = dot(d, d);
         let cosine = -dot(d, n) * inverseSqrt(max(distance_squared, 1e-20));
+        if !(centers[map].w > 0.0 && cosine > 0.0) {
+            continue;
+        }
         // Area of the surface that a texel shows.
         let area = distance_squared / max(cosine, 0.02);
-        if centers[map].w > 0.0 && cosine > 0.0 && area < least && map_light_shows(env_map_texel(map, d, map_size), d, n, map_size) {
+        let shows = map_light_shows(env_map_texel(map, d, map_size), d, n, map_size);
+        if (shows && !is_shown) || (shows == is_shown && area < least) {
             best = map;
             least = area;
+            is_shown = shows;
         }
     }
     return best;
@@ -55,8 +62,5 @@ fn map_light_at(p: vec3f, n: vec3f, map_count: u32, map_size: u32) -> vec3f {
             sum += share.x * share.y * textureLoad(map_light, at, 6u * map + point.face, 0);
         }
     }
-    if sum.a > 0.0 {
-        return sum.rgb / sum.a;
-    }
-    return textureLoad(map_light, cube_face_texel(point.uv, size), 6u * map + point.face, 0).rgb;
+    return sum.rgb / max(sum.a, 1e-20);
 }

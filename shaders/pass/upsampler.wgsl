@@ -32,31 +32,11 @@ struct Marking {
 @group(0) @binding(7) var irradiance: texture_storage_2d<rgba32float, write>;
 @group(0) @binding(8) var<storage, read_write> marked: Marking;
 
-// Positions come from f32 depths through an f32 matrix: some ten roundings of 2^-24 of the numbers involved, which are of
-// the order of the region's radius (at most 1) or of the distance to the eye.
-const ROUNDING: f32 = 0x1p-20;
 // Misfits of samples without a surface, and of those whose misfit is no number.
 const UNSEEN: f32 = 3e38;
 const WORST: f32 = 1e38;
-// What a sample of another surface is worse by: taken only where there is none of the pixel's own.
-const OTHER_SURFACE: f32 = 1e6;
 // Where the samples that fit weigh less than this together, of 1, they lie to one side.
 const LEAST_FIT: f32 = 0.25;
-
-// A pixel and the surface element that it sees.
-struct Receiver {
-    pixel: vec2u,
-    position: vec3f,
-    shading: vec3f,
-    // Geometric normal
-    normal: vec3f,
-    // Clip space w: distance along the axis of a perspective, else 1
-    w: f32,
-    // Width of a pixel at its distance
-    pixel_width: f32,
-    // Number of its surface, 0: none in particular
-    surface: u32,
-}
 
 // What a sample says, and how well it fits a receiver.
 struct Sample {
@@ -85,60 +65,14 @@ fn mean_with(mean: Mean, value: vec3f, weight: f32) -> Mean {
     return Mean(mean.value + min(1.0, weight / total) * (value - mean.value), total);
 }
 
-fn position_at(pixel: vec2u) -> vec3f {
-    return g_buffer_position(view, vec2f(pixel), textureLoad(depth_texture, pixel + view.origin, 0).r);
-}
-
-fn shading_normal_at(pixel: vec2u) -> vec3f {
-    return g_buffer_normal(view, textureLoad(normal_texture, pixel + view.origin, 0));
-}
-
-fn surface_at(pixel: vec2u) -> u32 {
-    return textureLoad(surface_texture, pixel + view.origin, 0).r;
-}
-
-fn is_surface(pixel: vec2u) -> bool {
-    return textureLoad(base_color_texture, pixel + view.origin, 0).a > 0.0;
-}
-
-fn receiver_at(pixel: vec2u) -> Receiver {
-    let limit = view.size - 1u;
-    let p = position_at(pixel);
-    let shading = shading_normal_at(pixel);
-    let around = Neighbours(
-        position_at(vec2u(max(pixel.x, 1u) - 1u, pixel.y)),
-        position_at(vec2u(min(pixel.x + 1u, limit.x), pixel.y)),
-        position_at(vec2u(pixel.x, max(pixel.y, 1u) - 1u)),
-        position_at(vec2u(pixel.x, min(pixel.y + 1u, limit.y))),
-    );
-    let normal = g_buffer_geometric_normal(view, vec2i(pixel), p, around, shading);
-    let w = dot(g_buffer_row(view, 3u), vec4f(p, 1.0));
-    return Receiver(pixel, p, shading, normal, w, w / g_buffer_pixels_a_length(view), surface_at(pixel));
-}
-
 // The sample of this index as the receiver sees it.
-fn sample_for(receiver: Receiver, index: vec2u) -> Sample {
+fn sample_for(receiver: BilateralReceiver, index: vec2u) -> Sample {
     let pixel = subsampling_pixel(index, params.factor, view.size);
-    if !is_surface(pixel) {
+    if !bilateral_is_surface(pixel) {
         return Sample(vec3f(0.0), 0.0, UNSEEN);
     }
-    let p = position_at(pixel);
-    let turned = (1.0 - dot(shading_normal_at(pixel), receiver.shading)) / (1.0 - params.normal_agreement);
-    // Not in units of the distance between both points: seen at a grazing angle, that is long where the plane is left by
-    // little, as from the top of a box to the floor behind it. On the plane itself the angle of view cancels out.
-    let distance = receiver.pixel_width * length(vec2f(pixel) - vec2f(receiver.pixel));
-    // The geometric normal is right where normals are mapped, the shading normal where a crease runs between a pixel's
-    // neighbours.
-    let apart = p - receiver.position;
-    let off_plane = min(abs(dot(apart, receiver.normal)), abs(dot(apart, receiver.shading)));
-    let lifted = off_plane / (params.plane_distance * distance + ROUNDING * (1.0 + receiver.w));
-    let surface = surface_at(pixel);
-    let is_other = surface != receiver.surface && surface != 0u && receiver.surface != 0u;
-    let misfit = turned + lifted + select(0.0, OTHER_SURFACE, is_other);
-    // What is linear on a plane in space is linear on the screen only over w: weights of 1 / w interpolate it exactly.
-    let perspective = receiver.w / dot(g_buffer_row(view, 3u), vec4f(p, 1.0));
-    let fit = select(perspective * max(0.0, 1.0 - turned) * max(0.0, 1.0 - lifted), 0.0, is_other);
-    return Sample(textureLoad(coarse, index, 0).rgb, fit, select(WORST, misfit, misfit < WORST));
+    let fit = bilateral_fit(receiver, pixel, params.normal_agreement, params.plane_distance);
+    return Sample(textureLoad(coarse, index, 0).rgb, fit.x, select(WORST, fit.y, fit.y < WORST));
 }
 
 struct Estimate {
@@ -155,10 +89,10 @@ fn is_in_doubt(total: f32, low: f32, high: f32) -> bool {
 
 fn estimate_at(id: vec2u) -> Estimate {
     let pixel_at = subsampling_pixel(id, params.target_factor, view.size);
-    if !is_surface(pixel_at) {
+    if !bilateral_is_surface(pixel_at) {
         return Estimate(vec3f(0.0), 0.0, false);
     }
-    let receiver = receiver_at(pixel_at);
+    let receiver = bilateral_receiver(pixel_at);
     let factor = i32(params.factor);
     let last = vec2i(min(subsampling_size(view.size, params.factor), textureDimensions(coarse))) - 1;
     // The four samples around the pixel. The last ones of an axis may stand closer; outside the outermost, they count alone.

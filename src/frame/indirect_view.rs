@@ -7,18 +7,19 @@ use crate::Error;
 use crate::pass::{BvhTracerResources, BvhTracerSurfaceRayInputs};
 use crate::pass::{
     EmissionImportanceInputs, EmissionImportanceResources, FinalGather, FinalGatherInputs, FinalGatherResources,
-    ImageSpaceTracerRayInputs, ImageSpaceTracerResources, MarkedSplatInputs, PhotonSplatter, PhotonSplatterInputs,
+    ImageSpaceTracerRayInputs, ImageSpaceTracerResources, IrradianceFilter, IrradianceFilterInputs,
+    IrradianceFilterResources, IrradianceFilterSettings, MarkedSplatInputs, PhotonSplatter, PhotonSplatterInputs,
     PhotonSplatterResources, PhotonSplatterSettings, SplatShape, Upsampler, UpsamplerInputs, UpsamplerResources,
     progressive_scale,
 };
-use crate::resource::{GBuffer, Irradiance, Lights, MarkedPixels, Photons, Subsampling, SurfaceRays};
+use crate::resource::{EnvMaps, GBuffer, Irradiance, Lights, MarkedPixels, Photons, Subsampling, SurfaceRays};
 
 /// From photons to the pixels of a view.
 #[derive(Debug)]
 pub(super) struct ViewPasses {
     photon_splatter: PhotonSplatter,
     /// If the settings gather.
-    final_gather: Option<FinalGather>,
+    final_gather: Option<(FinalGather, IrradianceFilter)>,
     upsampler: Upsampler,
 }
 
@@ -44,6 +45,8 @@ enum Estimate {
 struct GatherView {
     rays: SurfaceRays,
     own: FinalGatherResources,
+    /// If noise is evened out: what it was before.
+    filter: Option<(Irradiance, IrradianceFilterResources)>,
     image_space: ImageSpaceTracerResources,
     #[cfg(feature = "bvh")]
     bvh: BvhTracerResources,
@@ -83,7 +86,7 @@ impl ViewPasses {
         let gathers = settings.indirect_method == IndirectMethod::FinalGather;
         Ok(Self {
             photon_splatter: PhotonSplatter::new(device, &settings.splatter_config)?,
-            final_gather: gathers.then(|| FinalGather::new(device)),
+            final_gather: gathers.then(|| (FinalGather::new(device), IrradianceFilter::new(device))),
             upsampler: Upsampler::new(device),
         })
     }
@@ -250,10 +253,15 @@ fn splat(
 
 impl GatherView {
     fn new(device: &wgpu::Device, settings: &Settings, size: [u32; 2]) -> Result<Self, Error> {
+        let filter = || -> Result<_, Error> {
+            let gathered = Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?;
+            Ok((gathered, IrradianceFilterResources::new(device)?))
+        };
         let rays = u64::from(size[0]) * u64::from(size[1]) * u64::from(settings.final_gather.rays);
         Ok(Self {
             rays: SurfaceRays::new(device, u32::try_from(rays).unwrap_or(u32::MAX))?,
             own: FinalGatherResources::new(device)?,
+            filter: (settings.final_gather.filter_radius > 0).then(filter).transpose()?,
             image_space: ImageSpaceTracerResources::new(device)?,
             #[cfg(feature = "bvh")]
             bvh: BvhTracerResources::new(device)?,
@@ -267,7 +275,7 @@ impl GatherView {
         estimated: &Irradiance,
         inputs: &IndirectViewInputs<'_>,
     ) -> Result<(), Error> {
-        let (Some(pass), Some(env_maps), Some(light)) = (
+        let (Some((pass, filter)), Some(env_maps), Some(light)) = (
             &inputs.passes.0.final_gather,
             inputs.scene.env_maps(),
             inputs.scene.env_map_irradiance(),
@@ -281,35 +289,36 @@ impl GatherView {
             rays: &self.rays,
             env_maps,
             light,
-            irradiance: estimated,
+            irradiance: self.filter.as_ref().map_or(estimated, |f| &f.0),
             sample_offset: inputs.sample_offset,
             timestamps: inputs.view.timestamps,
         };
         pass.record_rays(encoder, &mut self.own, &gather_inputs);
-        #[cfg(feature = "bvh")]
-        if let (Some(tracer), Some(geometry)) = (&inputs.passes.1.bvh_tracer, inputs.view.bvh) {
-            let ray_inputs = BvhTracerSurfaceRayInputs {
-                queue: inputs.view.queue,
-                geometry,
-                rays: &self.rays,
-                timestamps: inputs.view.timestamps,
-            };
-            tracer.record_surface_rays(encoder, &mut self.bvh, &ray_inputs);
-            pass.record(encoder, &mut self.own, &gather_inputs);
-            return Ok(());
-        }
-        if let Some(tracer) = &inputs.passes.1.image_space_tracer {
-            let ray_inputs = ImageSpaceTracerRayInputs {
-                queue: inputs.view.queue,
-                env_maps,
-                hierarchy: inputs.scene.depth_hierarchy(),
-                rays: &self.rays,
-                settings: &inputs.settings.tracer,
-                timestamps: inputs.view.timestamps,
-            };
-            tracer.record_rays(encoder, &mut self.image_space, &ray_inputs)?;
-        }
+        let tracer = TracedRays {
+            rays: &self.rays,
+            env_maps,
+            image_space: &mut self.image_space,
+            #[cfg(feature = "bvh")]
+            bvh: &mut self.bvh,
+        };
+        tracer.record(encoder, inputs)?;
         pass.record(encoder, &mut self.own, &gather_inputs);
+        if let Some((gathered, own)) = &mut self.filter {
+            let filter_inputs = IrradianceFilterInputs {
+                queue: inputs.view.queue,
+                g_buffer: inputs.g_buffer,
+                subsampling: inputs.settings.subsampling,
+                estimate: gathered,
+                irradiance: estimated,
+                settings: &IrradianceFilterSettings {
+                    radius: inputs.settings.final_gather.filter_radius,
+                    normal_agreement: inputs.settings.upsampler.normal_agreement,
+                    plane_distance: inputs.settings.upsampler.plane_distance,
+                },
+                timestamps: inputs.view.timestamps,
+            };
+            filter.record(encoder, own, &filter_inputs);
+        }
         Ok(())
     }
 
@@ -317,7 +326,47 @@ impl GatherView {
         let tracers = self.image_space.memory_use();
         #[cfg(feature = "bvh")]
         let tracers = tracers + self.bvh.memory_use();
-        self.rays.memory_use() + self.own.memory_use() + tracers
+        let filter = self.filter.as_ref().map_or(0, |f| f.0.memory_use() + f.1.memory_use());
+        self.rays.memory_use() + self.own.memory_use() + filter + tracers
+    }
+}
+
+/// Rays that one tracer or the other follows.
+struct TracedRays<'a> {
+    rays: &'a SurfaceRays,
+    env_maps: &'a EnvMaps,
+    image_space: &'a mut ImageSpaceTracerResources,
+    #[cfg(feature = "bvh")]
+    bvh: &'a mut BvhTracerResources,
+}
+
+impl TracedRays<'_> {
+    /// Against triangles if the settings trace any, else through environment maps.
+    fn record(self, encoder: &mut wgpu::CommandEncoder, inputs: &IndirectViewInputs<'_>) -> Result<(), Error> {
+        let passes = inputs.passes.1;
+        #[cfg(feature = "bvh")]
+        if let (Some(tracer), Some(geometry)) = (&passes.bvh_tracer, inputs.view.bvh) {
+            let ray_inputs = BvhTracerSurfaceRayInputs {
+                queue: inputs.view.queue,
+                geometry,
+                rays: self.rays,
+                timestamps: inputs.view.timestamps,
+            };
+            tracer.record_surface_rays(encoder, self.bvh, &ray_inputs);
+            return Ok(());
+        }
+        let Some(tracer) = &passes.image_space_tracer else {
+            return Ok(());
+        };
+        let ray_inputs = ImageSpaceTracerRayInputs {
+            queue: inputs.view.queue,
+            env_maps: self.env_maps,
+            hierarchy: inputs.scene.depth_hierarchy(),
+            rays: self.rays,
+            settings: &inputs.settings.tracer,
+            timestamps: inputs.view.timestamps,
+        };
+        tracer.record_rays(encoder, self.image_space, &ray_inputs)
     }
 }
 

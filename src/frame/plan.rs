@@ -38,6 +38,8 @@ pub enum Stage {
     PhotonSplatter,
     /// What rays bring back from lit environment maps.
     FinalGather,
+    /// Noise evened out along surfaces.
+    IrradianceFilter,
     /// Irradiance of some pixels to all of them.
     Upsampler,
     /// Photons by way of mirrors and glass.
@@ -101,7 +103,7 @@ impl Plan {
         let [selection, maps, hierarchies] = map_stages(&indirect, settings);
         let [image_space, bvh] = tracers(&indirect, settings);
         let upsampling = upsampling(&indirect, settings);
-        let [splatting, gathering] = estimates(&indirect, settings);
+        let [splatting, gathering, filtering] = estimates(&indirect, settings);
         Self {
             stages: vec![
                 stage(Stage::GBufferCapture, always("every view")),
@@ -118,7 +120,8 @@ impl Plan {
                 stage(Stage::BvhTracer, bvh),
                 stage(Stage::EnvMapLighting, gathering.clone()),
                 stage(Stage::PhotonSplatter, splatting),
-                stage(Stage::FinalGather, gathering),
+                stage(Stage::FinalGather, gathering.clone()),
+                stage(Stage::IrradianceFilter, filtering),
                 stage(Stage::Upsampler, upsampling),
                 stage(Stage::CausticPhotons, (false, caustics)),
                 stage(Stage::Composite, always("every view")),
@@ -190,10 +193,10 @@ fn importance(indirect: &(bool, String), settings: &Settings) -> (bool, String) 
     }
 }
 
-/// From photons to pixels: the photons around, or rays to lit environment maps.
-fn estimates(indirect: &(bool, String), settings: &Settings) -> [(bool, String); 2] {
+/// From photons to pixels: the photons around, or rays to lit environment maps, and a filter of their noise.
+fn estimates(indirect: &(bool, String), settings: &Settings) -> [(bool, String); 3] {
     if !indirect.0 {
-        return [indirect.clone(), indirect.clone()];
+        return [(); 3].map(|()| indirect.clone());
     }
     let [splatting, gathering] = match settings.indirect_method {
         IndirectMethod::Splatting => [indirect.clone(), (false, "settings take the photons around".to_owned())],
@@ -205,7 +208,12 @@ fn estimates(indirect: &(bool, String), settings: &Settings) -> [(bool, String);
             ]
         }
     };
-    [splatting, gathering]
+    let filtering = match settings.final_gather.filter_radius {
+        _ if !gathering.0 => gathering.clone(),
+        0 => (false, "settings leave the noise of rays".to_owned()),
+        radius => (true, format!("noise of rays over {radius} pixel(s) to each side")),
+    };
+    [splatting, gathering, filtering]
 }
 
 /// The tracer in image space, and that of triangles.

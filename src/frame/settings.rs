@@ -3,8 +3,8 @@
 use crate::Error;
 use crate::pass::{
     Bandwidth, BoundaryCorrection, CoverageMeasure, EnvMapSelectorResources, EnvMapSelectorSettings,
-    ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS, MAX_SELECTED, MAX_TAPS, PenumbraSearch, PhotonSplatterConfig,
-    PhotonSplatterSettings, SoftShadowSettings, SplatShape, TraceMethod, UpsamplerSettings,
+    ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS, MAX_SELECTED, MAX_TAPS, MOST_FILTER_RADIUS, PenumbraSearch,
+    PhotonSplatterConfig, PhotonSplatterSettings, SoftShadowSettings, SplatShape, TraceMethod, UpsamplerSettings,
 };
 use crate::resource::Subsampling;
 
@@ -60,14 +60,17 @@ pub struct FinalGatherSettings {
     /// Photons under a kernel there, above 0: kernels are all of one width. Fewer are faster and keep more detail; their noise is
     /// evened out over the rays.
     pub photons: f32,
+    /// Estimated pixels to each side that the noise of rays is evened out over, 0 to 16. Pays with few rays: 64 want 1.
+    pub filter_radius: u32,
 }
 
 impl Default for FinalGatherSettings {
     fn default() -> Self {
         Self {
-            rays: 64,
+            rays: 256,
             map_size: 32,
             photons: 50.0,
+            filter_radius: 0,
         }
     }
 }
@@ -471,6 +474,12 @@ const KNOBS: &[Knob] = &[
     field!("final_gather.map_size", "4 to 8192", final_gather.map_size, |v| (4
         ..=8192)
         .contains(&v)),
+    field!(
+        "final_gather.filter_radius",
+        "0 to 16",
+        final_gather.filter_radius,
+        |v| v <= MOST_FILTER_RADIUS
+    ),
     field!(
         "final_gather.photons",
         "above 0: photons under a kernel",

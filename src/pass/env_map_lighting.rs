@@ -5,8 +5,8 @@
 //! [`PhotonSplatter`](super::PhotonSplatter) does on the screen, of cells of space instead of its bins. Sources: Yao et al. 2010,
 //! section 7 (lit environment maps); Larsen 2004, chapter 11 (gathering from lit surfaces).
 //!
-//! Cost: photons sorted, then texels × photons of the 27 cells around, which are as wide as the widest kernel. Limits: kernels
-//! are at most a 32nd of the region's diameter narrower than they should be where that is wider than a cell.
+//! Cost: photons sorted, then texels × photons of the 27 cells around, which are as wide as the widest kernel that evenly
+//! spread photons have. Limits: no kernel is wider than a cell; lamps count by their centres.
 
 use super::photon_splatter::{self, gpu::Bandwidth as BandwidthUniform};
 use super::stable_sort::{Side, SortBuffers, StableSort};

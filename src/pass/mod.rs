@@ -19,6 +19,7 @@ pub(crate) mod final_gather;
 mod full_screen;
 mod g_buffer_capture;
 pub(crate) mod image_space_tracer;
+pub(crate) mod irradiance_filter;
 pub(crate) mod nearest_occluder;
 pub(crate) mod photon_emitter;
 pub(crate) mod photon_splatter;
@@ -52,6 +53,10 @@ pub use g_buffer_capture::{GBufferCapture, GBufferCaptureInputs};
 pub use image_space_tracer::{
     ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerRayInputs, ImageSpaceTracerResources,
     ImageSpaceTracerSettings, TraceMethod,
+};
+pub(crate) use irradiance_filter::MOST_RADIUS as MOST_FILTER_RADIUS;
+pub use irradiance_filter::{
+    IrradianceFilter, IrradianceFilterInputs, IrradianceFilterResources, IrradianceFilterSettings,
 };
 pub use nearest_occluder::{NearestOccluder, NearestOccluderInputs, NearestOccluderResources};
 pub use photon_emitter::{PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources};
