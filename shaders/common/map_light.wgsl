@@ -13,8 +13,14 @@ fn map_light_shows(texel: EnvMapTexel, p: vec3f, n: vec3f, map_size: u32) -> boo
     return texel.surface.distance > 0.0 && is_near && dot(texel.surface.normal, n) >= MAP_LIGHT_AGREEMENT;
 }
 
+// Whether what a texel shows lies next to a point, on whatever surface.
+fn map_light_is_beside(texel: EnvMapTexel, p: vec3f, map_size: u32) -> bool {
+    let offset = p - texel.direction * texel.surface.distance;
+    return length(offset) <= MAP_LIGHT_OFF_PLANE + 4.0 * length(p) / f32(map_size);
+}
+
 // The map that shows a point in most detail. In the tip of a corner, where a texel may show one wall where the point is on
-// another, none may: then the one that would. The number of maps if none looks at its front.
+// another, none may: then one that shows what is beside it. The number of maps if there is none.
 fn map_light_map(p: vec3f, n: vec3f, map_count: u32, map_size: u32) -> u32 {
     var best = map_count;
     var least = 1e30;
@@ -28,7 +34,11 @@ fn map_light_map(p: vec3f, n: vec3f, map_count: u32, map_size: u32) -> u32 {
         }
         // Area of the surface that a texel shows.
         let area = distance_squared / max(cosine, 0.02);
-        let shows = map_light_shows(env_map_texel(map, d, map_size), d, n, map_size);
+        let texel = env_map_texel(map, d, map_size);
+        let shows = map_light_shows(texel, d, n, map_size);
+        if !shows && !map_light_is_beside(texel, d, map_size) {
+            continue;
+        }
         if (shows && !is_shown) || (shows == is_shown && area < least) {
             best = map;
             least = area;
