@@ -235,7 +235,7 @@ fn faces_of_environment_maps_are_splatted_over_like_any_g_buffer_and_lit_the_sam
     let maps = bench.capture(&[center], size).unwrap();
     let mut random = Random(5);
     let photons = on_walls(&gpu, half, || {
-        let mut unit = || random.unit() as f32;
+        let mut unit = || random.unit();
         let mut place = || ([2.0 * unit() - 1.0, 2.0 * unit() - 1.0], [unit(), unit(), unit()]);
         (0..2000).map(|_| place()).collect()
     });
@@ -429,10 +429,7 @@ fn the_filter_keeps_even_light_and_edges_and_evens_out_noise() {
     }
     // By its weights, Σw² / (Σw)², it leaves a twentieth of the variance where all pixels around are on one wall.
     let mut random = Random(11);
-    let noise: Vec<[f32; 4]> = normals
-        .iter()
-        .map(|_| [2.0 * random.unit() as f32, 0.0, 0.0, 1.0])
-        .collect();
+    let noise: Vec<[f32; 4]> = normals.iter().map(|_| [2.0 * random.unit(), 0.0, 0.0, 1.0]).collect();
     let variance =
         |texels: &[[f32; 4]]| texels.iter().map(|t| (f64::from(t[0]) - 1.0).powi(2)).sum::<f64>() / texels.len() as f64;
     let (before, after) = (variance(&noise), variance(&filtered(&noise, 2)));

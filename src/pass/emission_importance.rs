@@ -188,8 +188,11 @@ impl EmissionImportance {
             slot_count: 0,
             light_count: inputs.lights.count(),
             row: 0,
-            // The larger of NaN and 0 is 0.
-            share: inputs.share.max(0.0).min(MOST_SHARE),
+            share: if inputs.share > 0.0 {
+                inputs.share.min(MOST_SHARE)
+            } else {
+                0.0
+            },
             kept: KEPT,
         };
         inputs
