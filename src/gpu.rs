@@ -170,7 +170,7 @@ pub(crate) fn check_buffer(
             what: format!("{label} of {size} bytes"),
             needed: size,
             limit,
-            remedy: "use fewer photons, bounces or instances, or request a larger limit",
+            remedy: "use fewer photons, bounces, rays, instances or pixels, or request a larger limit",
         });
     }
     Ok(())

@@ -294,7 +294,7 @@ fn twins() -> Vec<Twin> {
             sample_offset,
         }),
         twin!(wgsl::FINAL_GATHER_SUM, "Params", final_gather::gpu::Params {
-            factor, ray_count, sample_offset, map_count, map_size,
+            factor, ray_count, first_row, row_count, sample_offset, map_count, map_size,
         }),
         twin!(wgsl::IRRADIANCE_FILTER, "Params", irradiance_filter::gpu::Params {
             factor, radius, normal_agreement, plane_distance,

@@ -5,7 +5,8 @@ mod common;
 
 use common::{Component, Gpu, Offline, assert_no_errors, gpu, mean, offline};
 use lightfall::frame::{
-    GiRenderer, IndirectMethod, SceneInputs, Settings, Stage, TracerKind, ViewInputs, ViewResources,
+    FinalGatherSettings, GiRenderer, IndirectMethod, SceneInputs, Settings, Stage, TracerKind, ViewInputs,
+    ViewResources,
 };
 use lightfall::glam::{DVec3, Vec3};
 use lightfall::pass::*;
@@ -88,14 +89,15 @@ fn every_pass_is_made_and_recorded_on_a_device_that_grants_only_the_defaults() {
     assert_eq!(descriptor.required_limits, wgpu::Limits::default());
     assert_eq!(descriptor.required_features, wgpu::Features::empty());
     let (device, queue) = wgpu::Device::noop(&descriptor);
-    make_and_record_every_pass(&device, &queue);
+    make_and_record_every_pass(&device, &queue, &samples::NAMES);
     if let Some(gpu) = gpu() {
-        make_and_record_every_pass(&gpu.device, &gpu.queue);
+        // Each renderer compiles its shaders anew.
+        make_and_record_every_pass(&gpu.device, &gpu.queue, &samples::NAMES[..1]);
         assert_no_errors(&gpu);
     }
 }
 
-fn make_and_record_every_pass(device: &wgpu::Device, queue: &wgpu::Queue) {
+fn make_and_record_every_pass(device: &wgpu::Device, queue: &wgpu::Queue, names: &[&str]) {
     let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
     use IndirectMethod::{FinalGather as G, Splatting as P};
     use {Kernel as K, SplatShape as Shape, Subsampling as S, TraceMethod as Method, TracerKind as Kind};
@@ -167,12 +169,8 @@ fn make_and_record_every_pass(device: &wgpu::Device, queue: &wgpu::Queue) {
         settings.final_gather.filter_radius = index as u32 % 2;
         settings.emission_importance = 0.5 * (index % 2) as f32;
         // The furnished ones, which take longest, once.
-        let names = if index == 0 {
-            &samples::NAMES[..]
-        } else {
-            &samples::NAMES[..7]
-        };
-        for name in names {
+        let most = if index == 0 { names.len() } else { names.len().min(7) };
+        for name in &names[..most] {
             let scene = samples::by_name(name, 0.5).unwrap();
             let mut geometry = MeshGeometry::new(device, queue, &scene).unwrap();
             let mut bvh = triangles(device, queue, &scene);
@@ -489,6 +487,18 @@ fn nothing_is_created_after_the_first_frame_and_memory_use_is_what_was_created()
         creates_once(&Settings {
             tracer_kind,
             bounces: 12,
+            ..small()
+        });
+        creates_once(&Settings {
+            tracer_kind,
+            indirect_method: IndirectMethod::FinalGather,
+            // More than one band of rows.
+            final_gather: FinalGatherSettings {
+                rays: 1024,
+                filter_radius: 1,
+                ..Default::default()
+            },
+            emission_importance: 0.5,
             ..small()
         });
     }

@@ -15,16 +15,6 @@ struct Params {
 @group(0) @binding(7) var irradiance: texture_storage_2d<rgba32float, write>;
 @group(1) @binding(0) var visibility: texture_2d_array<f32>;
 
-// Whether light reaches the point p of a surface with normal n, which faces the light.
-fn is_lit(light: Light, p: vec3f, n: vec3f) -> bool {
-    let probe = shadow_probe(light, p, params.shadow_map_size);
-    if !probe.is_inside {
-        return true;
-    }
-    let texel = surface_texel_unpack(textureLoad(shadow_maps, probe.texel, probe.ray.layer, 0));
-    return shadow_is_lit(light, probe, texel, p, n, params.shadow_map_size);
-}
-
 struct Surface {
     is_seen: bool,
     position: vec3f,
@@ -52,7 +42,7 @@ fn light_pixels(@builtin(global_invocation_id) id: vec3u) {
     var sum = vec3f(0.0);
     for (var i = 0u; i < params.light_count; i++) {
         let e = light_irradiance(lights[i], surface.position, surface.normal);
-        if any(e > vec3f(0.0)) && is_lit(lights[i], surface.position, surface.normal) {
+        if any(e > vec3f(0.0)) && is_lit(lights[i], surface.position, surface.normal, params.shadow_map_size) {
             sum += e;
         }
     }
@@ -79,7 +69,7 @@ fn light_pixels_by_visibility(@builtin(global_invocation_id) id: vec3u) {
         }
         if i < layers {
             sum += e * textureLoad(visibility, id.xy, i, 0).r;
-        } else if is_lit(lights[i], surface.position, surface.normal) {
+        } else if is_lit(lights[i], surface.position, surface.normal, params.shadow_map_size) {
             sum += e;
         }
     }

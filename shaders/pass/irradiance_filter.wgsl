@@ -45,7 +45,9 @@ fn filter_pixels(@builtin(global_invocation_id) id: vec3u) {
             let other = subsampling_pixel(vec2u(index), params.factor, view.size);
             if bilateral_is_surface(other) {
                 let weight = share * bilateral_fit(receiver, other, params.normal_agreement, params.plane_distance).x;
-                sum += weight * vec4f(textureLoad(estimate, index, 0).rgb, 1.0);
+                if weight > 0.0 {
+                    sum += weight * vec4f(textureLoad(estimate, index, 0).rgb, 1.0);
+                }
             }
         }
     }

@@ -156,7 +156,10 @@ pub struct ViewInputs<'a> {
 impl GiRenderer {
     /// Features that these settings need: none, unless they ask for quads blended in f32.
     pub fn required_features(settings: &Settings) -> wgpu::Features {
-        PhotonSplatter::required_features(&settings.splatter_config)
+        match settings.indirect_method {
+            IndirectMethod::Splatting => PhotonSplatter::required_features(&settings.splatter_config),
+            IndirectMethod::FinalGather => wgpu::Features::empty(),
+        }
     }
 
     /// Limits that suffice for any settings: the defaults. Large photon counts, and images of more than 33 million pixels, may
@@ -332,10 +335,11 @@ impl GiRenderer {
 
     /// Selects places for the environment maps. Submits and waits: for headless use and loading screens. Without it the
     /// selection begins with the first frame and arrives some frames later. It prepares the geometry for views of its own:
-    /// call it after `set_scene` and before `prepare`. Does nothing where the settings trace triangles alone.
+    /// call it after `set_scene` and before `prepare`. Does nothing where the settings need no environment maps.
     ///
     /// Where places are chosen by what photons reach ([`CoverageMeasure::Photons`](crate::pass::CoverageMeasure)), photons are
-    /// traced for it, through maps in places chosen by area, then through better ones.
+    /// traced for it, through maps in places chosen by area, then through better ones. Triangles are not at hand here: where the
+    /// settings trace them alone, the first hits of photons decide, and the frames that follow choose better by all of them.
     ///
     /// # Errors
     /// [`Error::ReadBack`], [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
@@ -370,7 +374,7 @@ impl GiRenderer {
     }
 
     /// Submits a frame of photons, in image space alone: triangles are not at hand, and where maps lose a ray there is
-    /// nothing for them to cover.
+    /// nothing for them to cover. Where only triangles are traced these are first hits.
     fn trace_for_selection(&mut self, queue: &wgpu::Queue, geometry: &mut dyn Geometry) -> Result<(), Error> {
         self.prepare(queue, geometry, &mut [])?;
         self.selection = None;
@@ -774,7 +778,7 @@ impl GiRenderer {
         self.state.as_ref().map(|s| &s.frame)
     }
 
-    /// Environment maps, while there is indirect light that is traced through them.
+    /// Environment maps, while there is indirect light that is traced through them or gathered from them.
     pub fn env_maps(&self) -> Option<&EnvMaps> {
         self.indirect.as_ref().and_then(IndirectScene::env_maps)
     }

@@ -14,11 +14,15 @@ use crate::pass::{
 };
 use crate::resource::{EnvMaps, GBuffer, Irradiance, Lights, MarkedPixels, Photons, Subsampling, SurfaceRays};
 
+/// Most rays of a band, 64 bytes each with what they meet: two of its lists fit what every device grants.
+const MOST_RAYS: u64 = 1 << 21;
+
 /// From photons to the pixels of a view.
 #[derive(Debug)]
 pub(super) struct ViewPasses {
-    photon_splatter: PhotonSplatter,
-    /// If the settings gather.
+    /// If the settings splat.
+    photon_splatter: Option<PhotonSplatter>,
+    /// If they gather.
     final_gather: Option<(FinalGather, IrradianceFilter)>,
     upsampler: Upsampler,
 }
@@ -43,8 +47,11 @@ enum Estimate {
 
 #[derive(Debug)]
 struct GatherView {
+    /// Of one band after the other.
     rays: SurfaceRays,
-    own: FinalGatherResources,
+    band_rows: u32,
+    /// Of each band.
+    own: Vec<FinalGatherResources>,
     /// If noise is evened out: what it was before.
     filter: Option<(Irradiance, IrradianceFilterResources)>,
     image_space: ImageSpaceTracerResources,
@@ -84,8 +91,9 @@ pub(super) struct IndirectViewInputs<'a> {
 impl ViewPasses {
     pub(super) fn new(device: &wgpu::Device, settings: &Settings) -> Result<Self, Error> {
         let gathers = settings.indirect_method == IndirectMethod::FinalGather;
+        let splatter = || PhotonSplatter::new(device, &settings.splatter_config);
         Ok(Self {
-            photon_splatter: PhotonSplatter::new(device, &settings.splatter_config)?,
+            photon_splatter: (!gathers).then(splatter).transpose()?,
             final_gather: gathers.then(|| (FinalGather::new(device), IrradianceFilter::new(device))),
             upsampler: Upsampler::new(device),
         })
@@ -173,7 +181,9 @@ impl IndirectView {
             passes
                 .upsampler
                 .record(encoder, &mut level.upsampler, &upsampler_inputs);
-            if let (Some(marked), Estimate::Splatting(own)) = (&level.marked, &mut self.estimate) {
+            if let (Some(marked), Estimate::Splatting(own), Some(splatter)) =
+                (&level.marked, &mut self.estimate, &passes.photon_splatter)
+            {
                 let marked_inputs = MarkedSplatInputs {
                     queue: view.queue,
                     g_buffer: inputs.g_buffer,
@@ -182,7 +192,7 @@ impl IndirectView {
                     marked,
                     timestamps: view.timestamps,
                 };
-                passes.photon_splatter.record_marked(encoder, own, &marked_inputs);
+                splatter.record_marked(encoder, own, &marked_inputs);
             }
             (coarse, subsampling) = (&level.irradiance, level.subsampling);
         }
@@ -248,7 +258,9 @@ fn splat(
         settings: &settings,
         timestamps: inputs.view.timestamps,
     };
-    inputs.passes.0.photon_splatter.record(encoder, own, &splatter_inputs);
+    if let Some(splatter) = &inputs.passes.0.photon_splatter {
+        splatter.record(encoder, own, &splatter_inputs);
+    }
 }
 
 impl GatherView {
@@ -257,10 +269,14 @@ impl GatherView {
             let gathered = Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?;
             Ok((gathered, IrradianceFilterResources::new(device)?))
         };
-        let rays = u64::from(size[0]) * u64::from(size[1]) * u64::from(settings.final_gather.rays);
+        let rays_a_row = u64::from(size[0]) * u64::from(settings.final_gather.rays);
+        let band_rows = (MOST_RAYS / rays_a_row).clamp(1, u64::from(size[1])) as u32;
+        let rays = u32::try_from(rays_a_row * u64::from(band_rows)).unwrap_or(u32::MAX);
+        let own = (0..size[1].div_ceil(band_rows)).map(|_| FinalGatherResources::new(device));
         Ok(Self {
-            rays: SurfaceRays::new(device, u32::try_from(rays).unwrap_or(u32::MAX))?,
-            own: FinalGatherResources::new(device)?,
+            rays: SurfaceRays::new(device, rays)?,
+            band_rows,
+            own: own.collect::<Result<_, _>>()?,
             filter: (settings.final_gather.filter_radius > 0).then(filter).transpose()?,
             image_space: ImageSpaceTracerResources::new(device)?,
             #[cfg(feature = "bvh")]
@@ -282,10 +298,12 @@ impl GatherView {
         ) else {
             return Ok(());
         };
-        let gather_inputs = FinalGatherInputs {
+        let mut gather_inputs = FinalGatherInputs {
             queue: inputs.view.queue,
             g_buffer: inputs.g_buffer,
             subsampling: inputs.settings.subsampling,
+            rows: [0, self.band_rows],
+            rays_a_pixel: inputs.settings.final_gather.rays,
             rays: &self.rays,
             env_maps,
             light,
@@ -293,16 +311,19 @@ impl GatherView {
             sample_offset: inputs.sample_offset,
             timestamps: inputs.view.timestamps,
         };
-        pass.record_rays(encoder, &mut self.own, &gather_inputs);
-        let tracer = TracedRays {
-            rays: &self.rays,
-            env_maps,
-            image_space: &mut self.image_space,
-            #[cfg(feature = "bvh")]
-            bvh: &mut self.bvh,
-        };
-        tracer.record(encoder, inputs)?;
-        pass.record(encoder, &mut self.own, &gather_inputs);
+        for own in &mut self.own {
+            pass.record_rays(encoder, own, &gather_inputs);
+            let tracer = TracedRays {
+                rays: &self.rays,
+                env_maps,
+                image_space: &mut self.image_space,
+                #[cfg(feature = "bvh")]
+                bvh: &mut self.bvh,
+            };
+            tracer.record(encoder, inputs)?;
+            pass.record(encoder, own, &gather_inputs);
+            gather_inputs.rows[0] += self.band_rows;
+        }
         if let Some((gathered, own)) = &mut self.filter {
             let filter_inputs = IrradianceFilterInputs {
                 queue: inputs.view.queue,
@@ -327,7 +348,8 @@ impl GatherView {
         #[cfg(feature = "bvh")]
         let tracers = tracers + self.bvh.memory_use();
         let filter = self.filter.as_ref().map_or(0, |f| f.0.memory_use() + f.1.memory_use());
-        self.rays.memory_use() + self.own.memory_use() + filter + tracers
+        let own: u64 = self.own.iter().map(FinalGatherResources::memory_use).sum();
+        self.rays.memory_use() + own + filter + tracers
     }
 }
 

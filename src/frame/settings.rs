@@ -20,7 +20,7 @@ pub enum TracerKind {
     /// Environment maps. Whatever can be drawn takes part; what no map sees loses light.
     #[default]
     ImageSpace,
-    /// The triangles of a `BvhGeometry`, which the host brings. No ray is lost, and no environment map is needed; geometry
+    /// The triangles of a `BvhGeometry`, which the host brings. No ray is lost, and photons need no environment map; geometry
     /// that is not in the trees does not take part. Feature `bvh`.
     Bvh,
     /// Environment maps, and triangles for the rays that these lose or are not sure of. Feature `bvh`.
@@ -28,12 +28,12 @@ pub enum TracerKind {
 }
 
 impl TracerKind {
-    /// Whether it needs environment maps.
+    /// Whether photons are traced through environment maps.
     pub fn uses_env_maps(self) -> bool {
         self != Self::Bvh
     }
 
-    /// Whether it needs a `BvhGeometry`.
+    /// Whether they meet the triangles of a `BvhGeometry`.
     pub fn uses_triangles(self) -> bool {
         self != Self::ImageSpace
     }

@@ -1,7 +1,7 @@
 //! Rays against the triangles themselves: the photon walk, and lists of rays.
 //!
-//! Inputs: [`BvhGeometry`], and [`Photons`] with hop 0 or [`Rays`]. Output: [`Photons`], hops 1 to its number of bounces,
-//! or of one hop those that another tracer lost ([`SharedHop`]), or hits of [`Rays`]. Cost: a ray visits some ten to thirty
+//! Inputs: [`BvhGeometry`], and [`Photons`] with hop 0, [`Rays`] or [`SurfaceRays`]. Output: [`Photons`], hops 1 to its number of
+//! bounces, or of one hop those that another tracer lost ([`SharedHop`]), or hits of [`Rays`] or [`SurfaceRays`]. Cost: a ray visits some ten to thirty
 //! nodes of 80 bytes and a few triangles of 48 (`docs/tracing.md`). Sources: Ylitie et al. 2017 (compressed wide trees),
 //! Woop et al. 2013 (watertight triangles); Yao's general tracer, section 3.2. Limits: geometry that a host deforms on the
 //! GPU alone is not in the trees; surfaces scatter as Lambertian ones. No ray is lost: it meets a triangle or has escaped.

@@ -5,7 +5,7 @@
 //! where a surface is seen, else 0. E = π times the mean of L over rays as dense as the cosine, L = ρ / π times the irradiance
 //! of the map that shows a ray's end in most detail. Sources: Larsen 2004, section 4.6 and chapter 11; Yao et al. 2010, section 7.
 //!
-//! Order: [`FinalGather::record_rays`], the tracer's `record_rays`, [`FinalGather::record`]. Cost: pixels × rays, each traced and
+//! Order, for each band of rows: [`FinalGather::record_rays`], the tracer's `record_rays`, [`FinalGather::record`]. Cost: pixels × rays, each traced and
 //! looked up in every map. Limits: the error is noise of few rays, the same every frame while `sample_offset` is; rays that
 //! the tracer loses, or whose end no map shows, bring nothing.
 
@@ -22,6 +22,8 @@ pub(crate) mod gpu {
     pub(crate) struct Params {
         pub(crate) factor: u32,
         pub(crate) ray_count: u32,
+        pub(crate) first_row: u32,
+        pub(crate) row_count: u32,
         pub(crate) sample_offset: u32,
         pub(crate) map_count: u32,
         pub(crate) map_size: u32,
@@ -62,7 +64,7 @@ pub struct FinalGather {
     sum: wgpu::ComputePipeline,
 }
 
-/// Uniforms and bind groups of one view.
+/// Uniforms and bind groups of one band of one view.
 #[derive(Debug)]
 pub struct FinalGatherResources {
     params: wgpu::Buffer,
@@ -79,8 +81,13 @@ pub struct FinalGatherInputs<'a> {
     pub g_buffer: &'a GBuffer,
     /// At which of its pixels.
     pub subsampling: Subsampling,
-    /// As many for each of those pixels as there is room for: see [`FinalGatherInputs::rays_a_pixel`]. The first step writes
-    /// them, a tracer says what they meet, the second step reads both.
+    /// Which rows of the irradiance, as first row and number: a band of it, where the rays of all do not fit one list. Each band
+    /// of a submission needs resources of its own.
+    pub rows: [u32; 2],
+    /// Rays of a pixel; as many as there is room for, if that is less.
+    pub rays_a_pixel: u32,
+    /// Room for the rays of the band's pixels. The first step writes them, a tracer says what they meet, the second step reads
+    /// both. What is left over is not written: it is to hold rays that a tracer may follow, as of a band before.
     pub rays: &'a SurfaceRays,
     /// What shows the surfaces where rays end.
     pub env_maps: &'a EnvMaps,
@@ -95,16 +102,19 @@ pub struct FinalGatherInputs<'a> {
 }
 
 impl FinalGatherInputs<'_> {
-    /// Rays of each pixel.
-    pub fn rays_a_pixel(&self) -> u32 {
+    /// Columns and rows of the band.
+    fn band(&self) -> [u32; 2] {
         let [width, height] = self.subsampling.size(self.g_buffer.size());
-        self.rays.count() / (width * height).max(1)
+        [width, self.rows[1].min(height.saturating_sub(self.rows[0]))]
     }
 
     fn params(&self) -> gpu::Params {
+        let [width, row_count] = self.band();
         gpu::Params {
             factor: self.subsampling.factor(),
-            ray_count: self.rays_a_pixel(),
+            ray_count: self.rays_a_pixel.min(self.rays.count() / (width * row_count).max(1)),
+            first_row: self.rows[0],
+            row_count,
             sample_offset: self.sample_offset,
             map_count: (self.env_maps.centers().len() as u32).min(self.light.capacity()),
             map_size: self.env_maps.size(),
@@ -170,7 +180,7 @@ impl FinalGather {
         let label = "lightfall::FinalGather::rays";
         let cache = &mut resources.spread_groups;
         let group = cache.get(&self.device, label, &self.spread_layout, &bound);
-        let [width, height] = inputs.subsampling.size(inputs.g_buffer.size());
+        let [width, height] = inputs.band();
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.spread);
         pass.set_bind_group(0, &group, &[]);
@@ -198,7 +208,7 @@ impl FinalGather {
         let label = "lightfall::FinalGather";
         let cache = &mut resources.sum_groups;
         let group = cache.get(&self.device, label, &self.sum_layout, &bound);
-        let [width, height] = inputs.subsampling.size(inputs.g_buffer.size());
+        let [width, height] = inputs.band();
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.sum);
         pass.set_bind_group(0, &group, &[]);

@@ -116,7 +116,8 @@ impl IrradianceFilter {
         let params = gpu::Params {
             factor: inputs.subsampling.factor(),
             radius: inputs.settings.radius.min(MOST_RADIUS),
-            normal_agreement: inputs.settings.normal_agreement,
+            // At 1 no normal would agree with itself. The smaller of NaN and it is it.
+            normal_agreement: inputs.settings.normal_agreement.min(0.9999),
             plane_distance: inputs.settings.plane_distance,
         };
         inputs

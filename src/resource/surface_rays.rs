@@ -1,4 +1,4 @@
-//! Lists of rays that leave surfaces, and what environment maps say of them.
+//! Lists of rays that leave surfaces, and what environment maps, or triangles, say of them.
 
 use super::{Photon, RayList};
 use bytemuck::{Pod, Zeroable};
@@ -43,11 +43,12 @@ pub enum SurfaceHitKind {
     Lost,
 }
 
-/// What the maps say of a ray.
+/// What the maps, or triangles, say of a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct SurfaceHit {
-    /// From 2^-12 above the ray's position, where it starts, unit frame; 0 if it meets nothing.
+    /// From where the ray starts, unit frame: 2^-12 above its position through maps, some units in the last place above it among
+    /// triangles. 0 if it meets nothing.
     pub distance: f32,
     /// A [`SurfaceHitKind`] as a number, from 1 in the order Surface, Escaped, Lost, Tentative.
     pub kind: u32,
@@ -55,7 +56,7 @@ pub struct SurfaceHit {
     pub normal: u32,
     /// Reflectance, 11-11-10.
     pub reflectance: u32,
-    /// Texels fetched on the way, of maps and hierarchies alike.
+    /// Texels fetched on the way, of maps and hierarchies alike; this and the following are 0 among triangles.
     pub fetches: u32,
     /// Maps walked through.
     pub maps: u32,

@@ -21,7 +21,7 @@ pub struct Instance {
     pub casts_shadow: bool,
     /// Which surface it is part of, by a number of the host's from 1: light that arrives there is spread over instances of the
     /// same number and no others, if [`PhotonSplatterConfig::keeps_to_surfaces`](crate::pass::PhotonSplatterConfig) says so,
-    /// however near they lie and whatever their normals. 0: no surface in particular, which takes light from all and gives to
+    /// however near they lie and whatever their normals; and irradiance is never interpolated from one to another. 0: no surface in particular, which takes light from all and gives to
     /// all (Larsen 2004, chapter 8).
     pub surface: u16,
 }

@@ -34,16 +34,7 @@ fn direct_light(p: vec3f, n: vec3f) -> vec3f {
     var sum = vec3f(0.0);
     for (var i = 0u; i < params.light_count; i++) {
         let e = light_irradiance(lights[i], p, n);
-        let probe = shadow_probe(lights[i], p, params.shadow_map_size);
-        if !any(e > vec3f(0.0)) {
-            continue;
-        }
-        if !probe.is_inside {
-            sum += e;
-            continue;
-        }
-        let texel = surface_texel_unpack(textureLoad(shadow_maps, probe.texel, probe.ray.layer, 0));
-        if shadow_is_lit(lights[i], probe, texel, p, n, params.shadow_map_size) {
+        if any(e > vec3f(0.0)) && is_lit(lights[i], p, n, params.shadow_map_size) {
             sum += e;
         }
     }
@@ -51,14 +42,7 @@ fn direct_light(p: vec3f, n: vec3f) -> vec3f {
 }
 
 fn indirect_light(receiver: Receiver) -> vec3f {
-    var g = Gathered();
-    g.x = receiver.position.x;
-    g.y = receiver.position.y;
-    g.z = receiver.position.z;
-    g.normal_x = receiver.normal.x;
-    g.normal_y = receiver.normal.y;
-    g.normal_z = receiver.normal.z;
-    g.surface = receiver.surface;
+    var g = gathered_nothing(receiver);
     let cell = cell_of(receiver.position);
     let first = max(cell - 1, vec3i(0));
     let last = min(cell + 1, vec3i(i32(params.cells) - 1));

@@ -5,6 +5,9 @@ struct Params {
     factor: u32,
     // Rays of a pixel
     ray_count: u32,
+    // Rows of the irradiance: from, how many
+    first_row: u32,
+    row_count: u32,
     sample_offset: u32,
     map_count: u32,
     map_size: u32,

@@ -16,16 +16,17 @@ fn shift(pixel: vec2u) -> vec2f {
 
 @compute @workgroup_size(8, 8)
 fn spread_rays(@builtin(global_invocation_id) id: vec3u) {
-    let size = subsampling_size(view.size, params.factor);
-    if any(id.xy >= size) {
+    let width = subsampling_size(view.size, params.factor).x;
+    if id.x >= width || id.y >= params.row_count {
         return;
     }
-    let receiver = receiver_at(subsampling_pixel(id.xy, params.factor, view.size));
+    let pixel = vec2u(id.x, params.first_row + id.y);
+    let receiver = receiver_at(subsampling_pixel(pixel, params.factor, view.size));
     let normal = select(vec3f(0.0, 0.0, 1.0), receiver.normal, receiver.is_seen);
     let frame = sampling_frame(normal);
     let packed = octahedral_pack(normal);
-    let first = params.ray_count * (id.y * size.x + id.x);
-    let own = shift(id.xy);
+    let first = params.ray_count * (id.y * width + id.x);
+    let own = shift(pixel);
     for (var i = 0u; i < params.ray_count; i++) {
         // Hammersley's points.
         let u = fract(vec2f((f32(i) + 0.5) / f32(params.ray_count), halton(i, 0u)) + own);

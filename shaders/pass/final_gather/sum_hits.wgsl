@@ -33,7 +33,8 @@ fn brought(index: u32) -> vec3f {
 @compute @workgroup_size(64)
 fn sum_hits(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let width = subsampling_size(view.size, params.factor).x;
-    let pixel = subsampling_pixel(group.xy, params.factor, view.size) + view.origin;
+    let own = vec2u(group.x, params.first_row + group.y);
+    let pixel = subsampling_pixel(own, params.factor, view.size) + view.origin;
     let is_seen = textureLoad(base_color_texture, pixel, 0).a > 0.0;
     let first = params.ray_count * (group.y * width + group.x);
     var sum = vec3f(0.0);
@@ -49,6 +50,6 @@ fn sum_hits(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
         workgroupBarrier();
     }
     if lane == 0u {
-        textureStore(irradiance, group.xy, vec4f(sums[0] / max(f32(params.ray_count), 1.0), f32(is_seen)));
+        textureStore(irradiance, own, vec4f(sums[0] / max(f32(params.ray_count), 1.0), f32(is_seen)));
     }
 }

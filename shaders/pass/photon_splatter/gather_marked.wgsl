@@ -37,14 +37,7 @@ fn gather_marked(
     let pixel = vec2u(marked.pixels[index] & 0xffffu, marked.pixels[index] >> 16u);
     let full = subsampling_pixel(pixel, params.factor, view.size);
     let seen = receiver_at(full);
-    var g = Gathered();
-    g.x = seen.position.x;
-    g.y = seen.position.y;
-    g.z = seen.position.z;
-    g.normal_x = seen.normal.x;
-    g.normal_y = seen.normal.y;
-    g.normal_z = seen.normal.z;
-    g.surface = seen.surface;
+    var g = gathered_nothing(seen);
     // Among the pixels that photons were sorted for.
     let place = irradiance_place(params.bandwidth, vec2f(full) + 0.5);
     gather_photons(&g, place, place);

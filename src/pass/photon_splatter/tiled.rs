@@ -303,7 +303,7 @@ impl TiledBuffers {
     pub(super) fn check(device: &wgpu::Device, slots: u32) -> Result<(), Error> {
         if slots > MOST_SPLATS {
             return Err(Error::LimitExceeded {
-                what: "photons for PhotonSplatter, without the first hop".into(),
+                what: "photons to be added up, without the first hop".into(),
                 needed: u64::from(slots),
                 limit: u64::from(MOST_SPLATS),
                 remedy: "emit fewer a frame and accumulate more frames, or let them bounce less often",
