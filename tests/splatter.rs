@@ -391,7 +391,7 @@ fn two_surfaces(gpu: &Gpu, surface: u32) -> (GBuffer, Vec<Photon>) {
     let is_left = |i: u32| i % SIZE < SIZE / 2;
     let mask: Vec<u8> = (0..SIZE * SIZE).map(|i| if is_on_plate(i) { 255 } else { 0 }).collect();
     let numbers: Vec<u16> = (0..SIZE * SIZE).map(|i| if is_left(i) { 3 } else { 70 }).collect();
-    let (_, photons) = plate(gpu, 160);
+    let (_, photons) = plate(gpu, 60);
     let on_left = photons.into_iter().filter(|p| p.position[0] < 0.0);
     let numbered = on_left.map(|p| Photon {
         light_and_surface: surface << 16,
@@ -404,8 +404,10 @@ fn two_surfaces(gpu: &Gpu, surface: u32) -> (GBuffer, Vec<Photon>) {
 fn light_keeps_to_its_surface_and_is_whole_at_the_rim_of_it() {
     let Some(gpu) = gpu() else { return };
     let (g_buffer, photons) = two_surfaces(&gpu, 3);
+    // Some 113 photons under a kernel: each addition in sixteen bits may cut off half a step of 2^-11.
+    let lost = 113.0 / 4096.0;
     let settings = PhotonSplatterSettings {
-        bandwidth: Bandwidth::Fixed(RADIUS),
+        bandwidth: Bandwidth::Fixed(0.1),
         ..Default::default()
     };
     // Irradiance just left and right of the border, away from the plate's rim.
@@ -422,8 +424,13 @@ fn light_keeps_to_its_surface_and_is_whole_at_the_rim_of_it() {
         let [left, right] = beside(keeps, &photons);
         let spilt = beside(config(shape), &photons);
         println!("{shape:?}: {left:.3} and {right:.3} W/m² beside the border, {spilt:.3?} where light spills over");
-        assert!((left - 1.0).abs() < 0.07 && right == 0.0, "{shape:?}");
-        assert!(spilt[0] < 0.6 && spilt[1] > 0.4, "{shape:?}");
+        // A straight rim holds 32 of the 64 points: two more or less are a sixteenth.
+        assert!(left < 1.07 && left > 0.93 - lost && right == 0.0, "{shape:?}");
+        // A kernel that stands half a pixel, 0.156 of its radius, off the border has half and 8 / 3π times that on its own
+        // side, 8 / 3π being what (1 - r²) 2 / π integrates to along the border.
+        for (found, wanted) in spilt.into_iter().zip([0.631, 0.369]) {
+            assert!((found - wanted).abs() < 0.01 + lost, "{shape:?}: {found}");
+        }
         // No surface in particular takes part in all.
         let unnumbered: Vec<_> = photons
             .iter()
