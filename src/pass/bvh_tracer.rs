@@ -60,12 +60,27 @@ pub struct BvhTracer {
 #[derive(Debug)]
 pub struct BvhTracerResources {
     walk: PhotonWalkResources,
-    ray_params: wgpu::Buffer,
-    ray_groups: BindGroupCache,
-    surface_ray_params: wgpu::Buffer,
-    surface_ray_groups: BindGroupCache,
+    rays: ListResources,
+    surface_rays: ListResources,
     geometry_groups: BindGroupCache,
     lost_groups: BindGroupCache,
+}
+
+/// Of one kind of list.
+#[derive(Debug)]
+struct ListResources {
+    params: wgpu::Buffer,
+    groups: BindGroupCache,
+}
+
+/// A list of either kind, and what traces it.
+struct ListOfRays<'a> {
+    label: &'static str,
+    pipeline: &'a wgpu::ComputePipeline,
+    count: u32,
+    /// Rays, and what they hit.
+    buffers: [&'a wgpu::Buffer; 2],
+    timestamps: Option<&'a Timestamps>,
 }
 
 /// What a frame gives it for the photon walk.
@@ -216,27 +231,15 @@ impl BvhTracer {
         resources: &mut BvhTracerResources,
         inputs: &BvhTracerRayInputs<'_>,
     ) {
-        let (groups, row) = dispatch_64(inputs.rays.count());
-        let params = gpu::Params {
-            ray_count: inputs.rays.count(),
-            row,
+        let list = ListOfRays {
+            label: "lightfall::BvhTracer::rays",
+            pipeline: &self.traces[inputs.query as usize],
+            count: inputs.rays.count(),
+            buffers: [inputs.rays.buffer(), inputs.rays.hits()],
+            timestamps: inputs.timestamps,
         };
-        inputs
-            .queue
-            .write_buffer(&resources.ray_params, 0, bytemuck::bytes_of(&params));
-        let label = "lightfall::BvhTracer::rays";
-        let bound = [
-            (&resources.ray_params).into(),
-            inputs.rays.buffer().into(),
-            inputs.rays.hits().into(),
-        ];
-        let rays = resources.ray_groups.get(&self.device, label, &self.ray_layout, &bound);
         let geometry = self.geometry_group(resources, inputs.geometry);
-        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
-        pass.set_pipeline(&self.traces[inputs.query as usize]);
-        pass.set_bind_group(0, &rays, &[]);
-        pass.set_bind_group(1, &geometry, &[]);
-        pass.dispatch_workgroups(groups[0], groups[1], 1);
+        self.record_list(encoder, &mut resources.rays, &geometry, (inputs.queue, &list));
     }
 
     /// Records the tracing of a list of rays that leave surfaces, as [`ImageSpaceTracer`](super::ImageSpaceTracer) does.
@@ -246,27 +249,37 @@ impl BvhTracer {
         resources: &mut BvhTracerResources,
         inputs: &BvhTracerSurfaceRayInputs<'_>,
     ) {
-        let (groups, row) = dispatch_64(inputs.rays.count());
+        let list = ListOfRays {
+            label: "lightfall::BvhTracer::surface_rays",
+            pipeline: &self.trace_surface_rays,
+            count: inputs.rays.count(),
+            buffers: [inputs.rays.buffer(), inputs.rays.hits()],
+            timestamps: inputs.timestamps,
+        };
+        let geometry = self.geometry_group(resources, inputs.geometry);
+        self.record_list(encoder, &mut resources.surface_rays, &geometry, (inputs.queue, &list));
+    }
+
+    fn record_list(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        own: &mut ListResources,
+        geometry: &wgpu::BindGroup,
+        (queue, list): (&wgpu::Queue, &ListOfRays<'_>),
+    ) {
+        let (groups, row) = dispatch_64(list.count);
         let params = gpu::Params {
-            ray_count: inputs.rays.count(),
+            ray_count: list.count,
             row,
         };
-        inputs
-            .queue
-            .write_buffer(&resources.surface_ray_params, 0, bytemuck::bytes_of(&params));
-        let label = "lightfall::BvhTracer::surface_rays";
-        let bound = [
-            (&resources.surface_ray_params).into(),
-            inputs.rays.buffer().into(),
-            inputs.rays.hits().into(),
-        ];
-        let cache = &mut resources.surface_ray_groups;
-        let rays = cache.get(&self.device, label, &self.ray_layout, &bound);
-        let geometry = self.geometry_group(resources, inputs.geometry);
-        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
-        pass.set_pipeline(&self.trace_surface_rays);
+        queue.write_buffer(&own.params, 0, bytemuck::bytes_of(&params));
+        let [rays, hits] = list.buffers;
+        let bound = [(&own.params).into(), rays.into(), hits.into()];
+        let rays = own.groups.get(&self.device, list.label, &self.ray_layout, &bound);
+        let mut pass = device::compute_pass(encoder, list.label, list.timestamps);
+        pass.set_pipeline(list.pipeline);
         pass.set_bind_group(0, &rays, &[]);
-        pass.set_bind_group(1, &geometry, &[]);
+        pass.set_bind_group(1, geometry, &[]);
         pass.dispatch_workgroups(groups[0], groups[1], 1);
     }
 
@@ -293,13 +306,8 @@ impl BvhTracerResources {
     pub fn for_shared_hops(device: &wgpu::Device, bounces: u32) -> Result<Self, Error> {
         Ok(Self {
             walk: PhotonWalkResources::new(device, "lightfall::BvhTracer::walk", bounces)?,
-            ray_params: device::uniform_buffer::<gpu::Params>(device, "lightfall::BvhTracer::params")?,
-            ray_groups: BindGroupCache::default(),
-            surface_ray_params: device::uniform_buffer::<gpu::Params>(
-                device,
-                "lightfall::BvhTracer::surface_ray_params",
-            )?,
-            surface_ray_groups: BindGroupCache::default(),
+            rays: ListResources::new(device)?,
+            surface_rays: ListResources::new(device)?,
             geometry_groups: BindGroupCache::default(),
             lost_groups: BindGroupCache::default(),
         })
@@ -307,6 +315,15 @@ impl BvhTracerResources {
 
     /// Bytes allocated.
     pub fn memory_use(&self) -> u64 {
-        self.walk.memory_use() + self.ray_params.size() + self.surface_ray_params.size()
+        self.walk.memory_use() + self.rays.params.size() + self.surface_rays.params.size()
+    }
+}
+
+impl ListResources {
+    fn new(device: &wgpu::Device) -> Result<Self, Error> {
+        Ok(Self {
+            params: device::uniform_buffer::<gpu::Params>(device, "lightfall::BvhTracer::params")?,
+            groups: BindGroupCache::default(),
+        })
     }
 }
