@@ -222,8 +222,10 @@ fn twins() -> Vec<Twin> {
         }),
         twin!(wgsl::DIRECT_LIGHT, "Light", lights::gpu::LightRecord {
             position, kind, direction, inner, intensity, outer, right, first_layer, up, layer_count, photon_flux,
-            half_extent, first_photon, photon_count, density, disc_radius, extent, _pad,
+            half_extent, first_photon, photon_count, density, disc_radius, extent, first_polygon,
+            direct_polygons, polygon_count,
         }),
+        twin!(wgsl::DIRECT_LIGHT, "Polygon", lights::gpu::Polygon { corner, corners, u, until, v, area, radiance, _pad }),
         twin!(wgsl::PHOTON_EMITTER, "Photon", Photon {
             position, state, flux, density, normal, direction, reflectance, light_and_surface,
         }),
@@ -246,7 +248,7 @@ fn twins() -> Vec<Twin> {
             distance, kind, normal, reflectance, fetches, maps, steps, pad,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "WalkParams", photon_walk::gpu::WalkParams {
-            photon_count, first_hop, last_hop, roulette_from, sample_offset, row,
+            photon_count, first_hop, last_hop, roulette_from, sample_offset, row, is_shared,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER_LIST, "LostRays", lost_rays::gpu::LostRays { workgroups, count, paths }),
         #[cfg(feature = "bvh")]

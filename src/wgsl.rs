@@ -33,6 +33,7 @@ pub(crate) const PHOTON_EMITTER: &str = compose![
     "common/emission_cells.wgsl",
     "common/emission_grid.wgsl",
     "common/light.wgsl",
+    "common/polygon.wgsl",
     "common/photon.wgsl",
     "common/surface_texel.wgsl",
     "common/octahedral.wgsl",
@@ -323,6 +324,7 @@ pub(crate) const ENV_MAP_LIGHTING: &str = compose![
     "common/receiver.wgsl",
     "common/photon.wgsl",
     "common/light_irradiance.wgsl",
+    "common/polygon.wgsl",
     "common/is_lit.wgsl",
     "common/shadow.wgsl",
     "common/light.wgsl",
@@ -386,6 +388,7 @@ pub(crate) const UPSAMPLER: &str = compose![
 pub(crate) const DIRECT_LIGHT: &str = compose![
     "pass/direct_light.wgsl",
     "common/light_irradiance.wgsl",
+    "common/polygon.wgsl",
     "common/is_lit.wgsl",
     "common/shadow.wgsl",
     "common/light.wgsl",

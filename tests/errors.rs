@@ -8,7 +8,9 @@ use lightfall::resource::{
     EnvMaps, GBuffer, GBufferViews, Irradiance, Lights, MAX_LIGHTS, MeshGeometry, NormalEncoding, Photons, Radiance,
     Visibility,
 };
-use lightfall::scene::{EnvironmentImage, Light, LightKind, Scene, SceneBounds, SceneSummary, UnitFrame, samples};
+use lightfall::scene::{
+    EmissiveTriangle, EnvironmentImage, Light, LightKind, Scene, SceneBounds, SceneSummary, UnitFrame, samples,
+};
 use lightfall::{Error, Timestamps, creation_count, wgpu};
 
 /// Runs on a fresh device and fails on any validation error.
@@ -480,7 +482,7 @@ fn counts_that_do_not_agree_are_named() {
         let lights = vec![Light::point(DVec3::ZERO, 1.0, [1.0; 3]); MAX_LIGHTS + 1];
         let error = Lights::new(device)
             .unwrap()
-            .write(queue, &frame, &lights, 10)
+            .write(queue, &frame, &lights, &[], 10)
             .unwrap_err();
         assert!(matches!(error, Error::CountMismatch { .. }), "{error}");
     });
@@ -508,10 +510,17 @@ fn a_summary_that_contradicts_itself_is_refused() {
             rotation: 0.0,
         };
         let error = renderer.set_scene(queue, &summary, &other_kind).unwrap_err();
-        assert!(
-            error.to_string().contains("rectangle and environment lights"),
-            "{error}"
-        );
+        assert!(error.to_string().contains("environment lights"), "{error}");
+        let unending = EmissiveTriangle {
+            corners: [DVec3::ZERO, DVec3::X, DVec3::splat(f64::NAN)],
+            radiance: [1.0; 3],
+        };
+        let shining = SceneSummary {
+            emissive_triangles: vec![unending],
+            ..summary.clone()
+        };
+        let error = renderer.set_scene(queue, &shining, &scene.lights).unwrap_err();
+        assert!(error.to_string().contains("emissive_triangles[0]"), "{error}");
         let mut broken = scene;
         broken.instances[0].mesh = 99;
         assert!(matches!(SceneSummary::of(&broken), Err(Error::InvalidScene { .. })));

@@ -57,7 +57,7 @@ fn light_maps(
 ) -> (EnvMapIrradiance, Vec<[f32; 4]>) {
     let Gpu { device, queue, .. } = bench.gpu;
     let mut lights = Lights::new(device).unwrap();
-    lights.write(queue, &bench.frame, &[], 0).unwrap();
+    lights.write(queue, &bench.frame, &[], &[], 0).unwrap();
     let shadow_maps = ShadowMaps::new(device, &bench.scene.lights, 4).unwrap();
     let irradiance = EnvMapIrradiance::new(device, &maps.maps, size).unwrap();
     let pass = EnvMapLighting::new(device, Kernel::Epanechnikov, false);

@@ -276,7 +276,9 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
     let frame = lightfall::scene::UnitFrame::new(&summary.bounds, summary.total_flux).unwrap();
     let mut geometry = MeshGeometry::new(device, queue, scene).unwrap();
     let mut lights = Lights::new(device).unwrap();
-    lights.write(queue, &frame, &scene.lights, settings.photons).unwrap();
+    lights
+        .write(queue, &frame, &scene.lights, &[], settings.photons)
+        .unwrap();
     let shadow_maps = ShadowMaps::new(device, &scene.lights, settings.shadow_map_size).unwrap();
     let mut env_maps = EnvMaps::new(device, settings.env_map_count, settings.env_map_size).unwrap();
     env_maps.set_centers(queue, centers).unwrap();

@@ -114,7 +114,7 @@ fn render_by(
     let mut geometry = MeshGeometry::new(device, queue, scene).unwrap();
     let shadow_maps = ShadowMaps::new(device, &scene.lights, map_size).unwrap();
     let mut lights = Lights::new(device).unwrap();
-    lights.write(queue, &frame, &scene.lights, 0).unwrap();
+    lights.write(queue, &frame, &scene.lights, &[], 0).unwrap();
     let mut camera = CameraView::new(&frame, &scene.cameras[0], size, [0.0; 2]);
     let mut views = vec![camera.capture];
     views.extend(shadow_maps.views(&frame, &scene.lights));

@@ -3,6 +3,8 @@
 const LIGHT_POINT: u32 = 0u;
 const LIGHT_SPOT: u32 = 1u;
 const LIGHT_DIRECTIONAL: u32 = 2u;
+// Flat: made of polygons, which shine from their fronts
+const LIGHT_AREA: u32 = 3u;
 
 struct Light {
     position: vec3f,
@@ -11,7 +13,7 @@ struct Light {
     direction: vec3f,
     // 1 - cos of the spot's inner half angle
     inner: f32,
-    // Radiant intensity, or irradiance on a perpendicular plane (directional)
+    // Radiant intensity, irradiance on a perpendicular plane (directional), or mean radiance (area)
     intensity: vec3f,
     // 1 - cos of the spot's outer half angle
     outer: f32,
@@ -24,11 +26,16 @@ struct Light {
     half_extent: f32,
     first_photon: u32,
     photon_count: u32,
-    // 1 / solid angle of full intensity (point, spot), or 1 / area of the disc (directional)
+    // 1 / solid angle of full intensity (point, spot), 1 / area of the disc (directional), or 1 / pi (area)
     density: f32,
     disc_radius: f32,
-    // Radius of the lamp (point, spot), or tangent of the half angle that it subtends (directional); 0: hard shadows
+    // Radius of the lamp (point, spot, area), or tangent of the half angle that it subtends (directional); 0: hard shadows
     extent: f32,
+    // Of an area light: direct light is that of the first so many polygons, photons start on those behind them, or on the
+    // same ones where there are no others
+    first_polygon: u32,
+    direct_polygons: u32,
+    polygon_count: u32,
 }
 
 // A ray of light: where it starts, its unit direction, and the layer and place where the shadow map holds it.

@@ -1,7 +1,15 @@
-// Irradiance that an unoccluded light gives a surface element.
+// Irradiance that an unoccluded light gives a surface element. The module brings `polygons`.
 fn light_irradiance(light: Light, p: vec3f, n: vec3f) -> vec3f {
     if light.kind == LIGHT_DIRECTIONAL {
         return light.intensity * max(0.0, -dot(n, light.direction));
+    }
+    if light.kind == LIGHT_AREA {
+        var sum = vec3f(0.0);
+        for (var i = 0u; i < light.direct_polygons; i++) {
+            let polygon = polygons[light.first_polygon + i];
+            sum += polygon.radiance * polygon_irradiance(polygon, p, n);
+        }
+        return sum;
     }
     let to_light = light.position - p;
     let distance_squared = max(dot(to_light, to_light), 0x1p-60);

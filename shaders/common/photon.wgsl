@@ -7,6 +7,9 @@ const PHOTON_LOST: u32 = 3u;
 const PHOTON_STATE_MASK: u32 = 3u;
 const PHOTON_FIRST_HIT: u32 = 256u;
 const PHOTON_TENTATIVE: u32 = 512u;
+// On the surface of a light, before its first hop: position, normal and direction are those of its start, the density is how
+// much more densely photons start this way. Stays on a first hop that is lost or, while another tracer follows, not certain.
+const PHOTON_STARTED: u32 = 1024u;
 // What a path keeps from its emission: bits 16 to 23 the cell that it started in, bits 24 to 31 how much more densely photons
 // start there than if they were spread evenly, 0 if they are.
 const PHOTON_EMISSION: u32 = 0xffff0000u;

@@ -8,6 +8,13 @@ fn random_unit(sequence_index: u32, dimension: u32) -> f32 {
     return hash_unit(sequence_index, dimension);
 }
 
+// A pair that is evenly spread by itself and beside the Halton sequence: an additive recurrence by powers of the plastic
+// number's inverse (Roberts 2018), in integer arithmetic.
+fn random_recurrence(sequence_index: u32) -> vec2f {
+    let bits = vec2u(sequence_index) * vec2u(3242174889u, 2447445414u);
+    return vec2f(bits >> vec2u(8u)) * 0x1p-24;
+}
+
 fn random_pair(sequence_index: u32, dimension: u32) -> vec2f {
     return vec2f(random_unit(sequence_index, dimension), random_unit(sequence_index, dimension + 1u));
 }

@@ -1,4 +1,4 @@
-// Direct irradiance: sum over lights of I cos / r^2, where the shadow map agrees, or times how much of the light is seen.
+// Direct irradiance: sum over lights of I cos / r^2, or of Lambert's formula for flat ones, where the shadow map agrees, or times how much of the light is seen.
 
 struct Params {
     light_count: u32,
@@ -13,6 +13,7 @@ struct Params {
 @group(0) @binding(5) var<storage, read> lights: array<Light>;
 @group(0) @binding(6) var shadow_maps: texture_2d_array<u32>;
 @group(0) @binding(7) var irradiance: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(8) var<storage, read> polygons: array<Polygon>;
 @group(1) @binding(0) var visibility: texture_2d_array<f32>;
 
 struct Surface {

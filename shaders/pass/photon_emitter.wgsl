@@ -1,4 +1,5 @@
-// Emits photons from every light and finds where they first land, in the light's reflective shadow map.
+// Emits photons from every light and finds where they first land, in the light's reflective shadow map. Those of flat lights
+// start on their surface instead, and the walk traces their first hop.
 
 struct Params {
     photon_count: u32,
@@ -12,6 +13,7 @@ struct Params {
 @group(0) @binding(1) var<storage, read> lights: array<Light>;
 @group(0) @binding(2) var shadow_maps: texture_2d_array<u32>;
 @group(0) @binding(3) var<storage, read_write> photons: array<Photon>;
+@group(0) @binding(4) var<storage, read> polygons: array<Polygon>;
 @group(1) @binding(0) var<storage, read> emission_tables: array<EmissionTable>;
 
 struct Emission {
@@ -66,12 +68,67 @@ fn emit_photons_by_cells(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
+// The first polygon of a flat light that photons start on.
+fn first_polygon(light: Light) -> u32 {
+    let is_for_both = light.polygon_count == light.direct_polygons;
+    return light.first_polygon + select(light.direct_polygons, 0u, is_for_both);
+}
+
+// The polygon whose share of the light's photons u lies in.
+fn polygon_of(light: Light, u: f32) -> u32 {
+    var low = first_polygon(light);
+    var high = light.first_polygon + light.polygon_count - 1u;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if polygons[middle].until > u {
+            high = middle;
+        } else {
+            low = middle + 1u;
+        }
+    }
+    return low;
+}
+
+// On the surface of a flat light, in proportion to the flux of its polygons, in directions by the cosine: four numbers, two
+// of them from an additive recurrence.
+fn emit_from_surface(light: Light, light_index: u32, sequence_index: u32, start: EmissionStart, kept: u32) -> Photon {
+    let place = random_recurrence(sequence_index);
+    let index = polygon_of(light, place.x);
+    let polygon = polygons[index];
+    var before = 0.0;
+    if index > first_polygon(light) {
+        before = polygons[index - 1u].until;
+    }
+    let share = polygon.until - before;
+    var at = vec2f(clamp((place.x - before) / share, 0.0, 1.0), place.y);
+    if polygon.corners == 3u && at.x + at.y > 1.0 {
+        at = 1.0 - at;
+    }
+    let normal = normalize(cross(polygon.u, polygon.v));
+    let direction = normalize(sampling_frame(normal) * sampling_cosine(start.u));
+    let flux = polygon.radiance * (POLYGON_PI * polygon.area / (share * f32(light.photon_count)));
+    return Photon(
+        polygon.corner + at.x * polygon.u + at.y * polygon.v,
+        PHOTON_EMPTY | PHOTON_STARTED | kept,
+        flux / start.boost,
+        start.boost,
+        octahedral_pack(normal),
+        octahedral_pack(direction),
+        0u,
+        light_index,
+    );
+}
+
 // `kept`: bits of the state that the path carries on.
 fn emit_photon(index: u32, start: EmissionStart, kept: u32) {
     let light_index = light_of(index);
     let light = lights[light_index];
     if index < light.first_photon || index >= light.first_photon + light.photon_count {
         photons[index] = photon_gone(PHOTON_EMPTY, vec3f(0.0), vec3f(0.0, 0.0, 1.0), 0u);
+        return;
+    }
+    if light.kind == LIGHT_AREA {
+        photons[index] = emit_from_surface(light, light_index, params.sample_offset + index, start, kept);
         return;
     }
     let emission = emit(light, start.u);

@@ -22,10 +22,10 @@ use crate::pass::{
 use crate::resource::BvhGeometry;
 use crate::resource::{
     CameraView, CapturePurpose, CaptureView, DepthHierarchy, EmissionCells, EnvMapIrradiance, EnvMaps, GBuffer,
-    Geometry, Irradiance, Lights, MarkedPixels, NearestOccluders, Photons, PrepareContext, Radiance, ShadowMaps,
-    Visibility,
+    Geometry, Irradiance, Lights, MAX_LIGHTS, MarkedPixels, NearestOccluders, Photons, PrepareContext, Radiance,
+    ShadowMaps, Visibility,
 };
-use crate::scene::{Camera, Light, LightKind, Projection, SceneBounds, SceneSummary, UnitFrame};
+use crate::scene::{Camera, Lamp, Light, LightKind, Projection, SceneBounds, SceneSummary, UnitFrame};
 use crate::{Error, Timestamps};
 use glam::DVec3;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
@@ -80,13 +80,15 @@ struct Passes {
 struct SceneState {
     frame: UnitFrame,
     plan: Plan,
+    /// Those given, and behind them those that stand for lamps.
     lights: Vec<Light>,
+    lamps: Vec<Lamp>,
     region: SceneBounds,
     /// Of all surfaces, unit frame.
     area: f32,
 }
 
-/// Allocated while there is a punctual light.
+/// Allocated while anything shines.
 #[derive(Debug)]
 struct DirectScene {
     lights: Lights,
@@ -224,36 +226,45 @@ impl GiRenderer {
             light.validate(index)?;
         }
         summary.validate(lights)?;
+        let lights_that_shine = lights.iter().filter(|l| !l.is_environment()).count();
+        let lamps = Lamp::group(
+            &summary.emissive_triangles,
+            MAX_LIGHTS.saturating_sub(lights_that_shine),
+        );
+        let sources = Lamp::with_lights(lights, &lamps);
         let frame = match &self.state {
             Some(state) => state.frame.follow(&summary.bounds, summary.total_flux)?,
             None => UnitFrame::new(&summary.bounds, summary.total_flux)?,
         };
         let plan = Plan::for_scene(summary, &self.settings);
-        self.allocate(queue, &plan, lights)?;
+        self.allocate(queue, &plan, &sources)?;
         let reach = |lights: &[Light]| {
             lights
                 .iter()
                 .map(|l| (l.kind, l.strength() == DVec3::ZERO))
                 .collect::<Vec<_>>()
         };
-        if self.state.as_ref().is_some_and(|s| reach(&s.lights) != reach(lights)) {
+        if self.state.as_ref().is_some_and(|s| reach(&s.lights) != reach(&sources)) {
             self.placement.lights_changed();
         }
-        let is_same = |s: &SceneState| s.lights == lights && s.frame.maps_like(&frame);
+        let is_same = |s: &SceneState| s.lights == sources && s.lamps == lamps && s.frame.maps_like(&frame);
         if !self.state.as_ref().is_some_and(is_same) {
             self.revision += 1;
         }
         self.state = Some(SceneState {
             frame,
             plan,
-            lights: lights.to_vec(),
+            lights: sources,
+            lamps,
             region: summary.bounds,
             area: frame.area(summary.area),
         });
-        if let Some(direct) = &mut self.direct {
-            direct.lights.write(queue, &frame, lights, self.settings.photons)?;
-        }
         if let Some(state) = &self.state {
+            if let Some(direct) = &mut self.direct {
+                direct
+                    .lights
+                    .write(queue, &frame, lights, &state.lamps, self.settings.photons)?;
+            }
             let context = selection_context(&self.device, queue, &self.settings, state);
             let is_needed = state.plan.is_on(Stage::EnvMapSelector);
             self.placement.follow(&context, is_needed)?;
@@ -728,7 +739,7 @@ impl GiRenderer {
             Some(DirectScene {
                 lights, soft: Some(_), ..
             }) => {
-                // As many layers as punctual lights; the same shadow maps may serve other numbers of them.
+                // As many layers as lights; the same shadow maps may serve other numbers of them.
                 if view.soft.as_ref().is_none_or(|s| s.0.lights() != lights.count()) {
                     let visibility = Visibility::new(device, size, lights.count())?;
                     let own = SoftShadowResources::new(device, size, lights.count())?;
@@ -799,7 +810,7 @@ impl GiRenderer {
         self.placement.coverage()
     }
 
-    /// Shadow maps, while there is a punctual light.
+    /// Shadow maps, while anything shines.
     pub fn shadow_maps(&self) -> Option<&ShadowMaps> {
         self.direct.as_ref().map(|d| &d.shadow_maps)
     }
@@ -853,12 +864,12 @@ impl ViewResources {
         &self.g_buffer
     }
 
-    /// Direct irradiance, if there is a punctual light.
+    /// Direct irradiance, if anything shines.
     pub fn direct(&self) -> Option<&Irradiance> {
         self.direct.as_ref().map(|d| &d.0)
     }
 
-    /// How much of each punctual light is seen, if one has an extent.
+    /// How much of each light is seen, if one has an extent.
     pub fn visibility(&self) -> Option<&Visibility> {
         self.soft.as_ref().map(|s| &s.0)
     }

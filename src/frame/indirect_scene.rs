@@ -232,7 +232,8 @@ impl IndirectScene {
         if self.lost.is_none() {
             self.record_walk(encoder, passes, inputs, None)?;
         } else {
-            let mut hops = 1..=self.photons.bounces();
+            let first = if inputs.lights.have_area() { 0 } else { 1 };
+            let mut hops = first..=self.photons.bounces();
             hops.try_for_each(|hop| self.record_walk(encoder, passes, inputs, Some(hop)))?;
         }
         self.record_lighting(encoder, passes, inputs);

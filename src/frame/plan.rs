@@ -78,9 +78,9 @@ pub struct Plan {
 impl Plan {
     /// Decides from what is in the scene and what the settings allow.
     pub fn for_scene(summary: &SceneSummary, settings: &Settings) -> Self {
-        let lit = match summary.punctual_lights() {
-            0 => (false, no_light(summary).to_owned()),
-            n => (true, format!("{n} light(s)")),
+        let lit = match summary.is_lit() {
+            false => (false, no_light(summary).to_owned()),
+            true => (true, sources(summary.lights - summary.environment_lights, summary)),
         };
         let indirect = indirect(summary, settings);
         let specular: Vec<_> = summary.metals.iter().chain(&summary.dielectrics).cloned().collect();
@@ -89,11 +89,12 @@ impl Plan {
         } else {
             "not modelled yet".to_owned()
         };
-        let soft = match summary.lights_with_extent {
-            0 => "no light has an extent".to_owned(),
-            n => format!("{n} light(s) with an extent"),
+        let has_extent = summary.lights_with_extent > 0 || !summary.emissive_triangles.is_empty();
+        let soft = match has_extent {
+            false => "no light has an extent".to_owned(),
+            true => format!("{} with an extent", sources(summary.lights_with_extent, summary)),
         };
-        let soft = (lit.0 && summary.lights_with_extent > 0, soft);
+        let soft = (lit.0 && has_extent, soft);
         let stage = |stage, (on, reason): (bool, String)| PlannedStage { stage, on, reason };
         let always = |reason: &str| (true, reason.to_owned());
         let nearest = match settings.soft_shadow.search {
@@ -136,17 +137,26 @@ impl Plan {
     }
 }
 
-/// Why nothing is lit where there is no punctual light.
+/// So many lights, and the surfaces that shine.
+fn sources(lights: usize, summary: &SceneSummary) -> String {
+    match (lights, summary.emissive_triangles.len()) {
+        (_, 0) => format!("{lights} light(s)"),
+        (0, n) => format!("{n} emissive triangle(s)"),
+        (_, n) => format!("{lights} light(s), {n} emissive triangle(s)"),
+    }
+}
+
+/// Why nothing is lit.
 fn no_light(summary: &SceneSummary) -> &'static str {
     match summary.lights {
         0 => "no light",
-        _ => "no point, spot or directional light",
+        _ => "no light but an environment",
     }
 }
 
 fn indirect(summary: &SceneSummary, settings: &Settings) -> (bool, String) {
     let off = |reason: &str| (false, reason.to_owned());
-    if summary.punctual_lights() == 0 {
+    if !summary.is_lit() {
         off(no_light(summary))
     } else if !summary.has_reflecting_surfaces {
         off("every surface is black")
@@ -242,7 +252,7 @@ fn upsampling(indirect: &(bool, String), settings: &Settings) -> (bool, String) 
 fn simplifications(summary: &SceneSummary) -> Vec<String> {
     let list = |names: &[String]| names.join(", ");
     let mut notes = Vec::new();
-    if !summary.emissive.is_empty() {
+    if !summary.emissive.is_empty() && summary.emissive_triangles.is_empty() {
         notes.push(format!(
             "shine for the eye alone, light nothing: {}",
             list(&summary.emissive)
@@ -254,11 +264,8 @@ fn simplifications(summary: &SceneSummary) -> Vec<String> {
     if !summary.dielectrics.is_empty() {
         notes.push(format!("glass, treated as Lambertian: {}", list(&summary.dielectrics)));
     }
-    if summary.lights_not_punctual > 0 {
-        notes.push(format!(
-            "rectangle and environment lights: light nothing yet ({})",
-            summary.lights_not_punctual
-        ));
+    if summary.environment_lights > 0 {
+        notes.push("the environment lights nothing yet".to_owned());
     }
     if summary.lights_with_extent > 0 {
         notes.push(format!(
@@ -286,7 +293,7 @@ impl fmt::Display for Plan {
 mod tests {
     use super::*;
     use crate::resource::Subsampling;
-    use crate::scene::SceneBounds;
+    use crate::scene::{EmissiveTriangle, SceneBounds};
     use glam::DVec3;
 
     fn summary() -> SceneSummary {
@@ -296,8 +303,9 @@ mod tests {
             triangles: 12,
             total_flux: 1.0,
             lights: 1,
-            lights_not_punctual: 0,
+            environment_lights: 0,
             lights_with_extent: 0,
+            emissive_triangles: Vec::new(),
             has_reflecting_surfaces: true,
             emissive: Vec::new(),
             metals: Vec::new(),
@@ -372,27 +380,49 @@ mod tests {
     }
 
     #[test]
-    fn lights_of_other_kinds_are_named_and_switch_no_stage_on() {
+    fn environments_are_named_and_switch_no_stage_on() {
         let settings = Settings::balanced();
-        let plan = |lights, lights_not_punctual| {
+        let plan = |lights, environment_lights| {
             let summary = SceneSummary {
                 lights,
-                lights_not_punctual,
+                environment_lights,
                 ..summary()
             };
             Plan::for_scene(&summary, &settings)
         };
-        let (dark, one, mixed) = (plan(0, 0), plan(1, 0), plan(3, 2));
+        let (dark, one, mixed) = (plan(0, 0), plan(1, 0), plan(2, 1));
         let on = |plan: &Plan| plan.stages.iter().map(|s| s.on).collect::<Vec<_>>();
-        assert_eq!(on(&plan(2, 2)), on(&dark));
+        assert_eq!(on(&plan(1, 1)), on(&dark));
         assert_eq!(mixed.stages, one.stages);
-        assert!(
-            mixed
-                .to_string()
-                .contains("rectangle and environment lights: light nothing yet (2)")
-        );
-        assert!(plan(2, 2).to_string().contains("no point, spot or directional light"));
+        assert!(mixed.to_string().contains("the environment lights nothing yet"));
+        assert!(plan(1, 1).to_string().contains("no light but an environment"));
         assert!(one.simplifications.is_empty());
+    }
+
+    #[test]
+    fn surfaces_that_shine_light_the_scene_where_their_triangles_are_known() {
+        let lamp = EmissiveTriangle {
+            corners: [DVec3::ZERO, DVec3::X, DVec3::Y],
+            radiance: [1.0; 3],
+        };
+        let plan = |emissive_triangles| {
+            let summary = SceneSummary {
+                lights: 0,
+                emissive: vec!["lamp".into()],
+                emissive_triangles,
+                ..summary()
+            };
+            Plan::for_scene(&summary, &Settings::balanced())
+        };
+        let (unknown, known) = (plan(Vec::new()), plan(vec![lamp]));
+        let stages = [Stage::DirectLight, Stage::SoftShadow, Stage::PhotonEmitter];
+        assert!(stages.iter().all(|&s| known.is_on(s) && !unknown.is_on(s)));
+        assert!(known.simplifications.is_empty());
+        assert!(
+            unknown
+                .to_string()
+                .contains("shine for the eye alone, light nothing: lamp")
+        );
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! tested here and its shadow is hard. A receiver is lit where it lies no further than the plane of the surface that its
 //! shadow-map texel holds, so flat surfaces need no bias; and where that texel saw something behind the receiver's own
 //! plane, which cannot be in the way. Source: deferred shading as in Yao et al. 2010, section 7. Limits: a lamp of some
-//! extent gives the irradiance of a point in its middle; what lies outside the region is not shadowed from directional
+//! extent gives the irradiance of a point in its middle, unless it is flat; what lies outside the region is not shadowed from directional
 //! light, and geometry further than two unit-frame lengths towards such a light does not shade.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
@@ -25,7 +25,7 @@ pub(crate) mod gpu {
 }
 
 /// Bindings of `shaders/pass/direct_light.wgsl`, group 0, in order.
-pub(crate) const SLOTS: [Slot; 8] = [
+pub(crate) const SLOTS: [Slot; 9] = [
     Slot::Uniform,
     Slot::Uniform,
     Slot::Texture,
@@ -34,6 +34,7 @@ pub(crate) const SLOTS: [Slot; 8] = [
     Slot::Storage,
     Slot::UintArray,
     Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
+    Slot::Storage,
 ];
 
 /// Group 1, where visibility is given.
@@ -131,6 +132,7 @@ impl DirectLight {
             inputs.lights.buffer().into(),
             inputs.shadow_maps.view().into(),
             inputs.irradiance.view().into(),
+            inputs.lights.polygons().into(),
         ];
         let label = "lightfall::DirectLight";
         let group = resources.groups.get(&self.device, label, &self.layout, &bound);

@@ -48,7 +48,7 @@ pub(crate) const SORT_SLOTS: [Slot; 6] = [
 ];
 
 /// Bindings of `shaders/pass/env_map_lighting/light_texels.wgsl`, in order.
-pub(crate) const LIGHT_SLOTS: [Slot; 8] = [
+pub(crate) const LIGHT_SLOTS: [Slot; 9] = [
     Slot::Uniform,
     Slot::UintArray,
     Slot::Storage,
@@ -57,6 +57,7 @@ pub(crate) const LIGHT_SLOTS: [Slot; 8] = [
     Slot::Storage,
     Slot::UintArray,
     Slot::StorageArray(wgpu::TextureFormat::Rgba32Float),
+    Slot::Storage,
 ];
 
 /// Most cells along each axis.
@@ -209,6 +210,7 @@ impl EnvMapLighting {
             inputs.lights.buffer().into(),
             inputs.shadow_maps.view().into(),
             inputs.irradiance.view().into(),
+            inputs.lights.polygons().into(),
         ];
         let label = "lightfall::EnvMapLighting";
         let cache = &mut resources.light_groups;

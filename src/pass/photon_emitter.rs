@@ -2,7 +2,8 @@
 //!
 //! Inputs: [`Lights`], [`ShadowMaps`], and [`EmissionCells`] where photons are not spread evenly. Output: [`Photons`], hop 0. Cost: proportional to the number of photons, one
 //! texel fetch each. Directions follow the Halton sequence; first hits are looked up in the light's reflective shadow map
-//! (Yao et al. 2010, section 7). Limits: the extent of a light is not sampled.
+//! (Yao et al. 2010, section 7). Photons of flat lights start anywhere on their surfaces, and hop 0 is left to the tracer, which
+//! traces it like any other. Limits: the extent of other lights is not sampled.
 
 use super::dispatch_64;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
@@ -25,7 +26,13 @@ pub(crate) mod gpu {
 }
 
 /// Bindings of `shaders/pass/photon_emitter.wgsl`, in order.
-pub(crate) const SLOTS: [Slot; 4] = [Slot::Uniform, Slot::Storage, Slot::UintArray, Slot::StorageMut];
+pub(crate) const SLOTS: [Slot; 5] = [
+    Slot::Uniform,
+    Slot::Storage,
+    Slot::UintArray,
+    Slot::StorageMut,
+    Slot::Storage,
+];
 
 /// Bindings of its group 1.
 pub(crate) const CELL_SLOTS: [Slot; 1] = [Slot::Storage];
@@ -119,6 +126,7 @@ impl PhotonEmitter {
             inputs.lights.buffer().into(),
             inputs.shadow_maps.view().into(),
             inputs.photons.buffer().into(),
+            inputs.lights.polygons().into(),
         ];
         let label = "lightfall::PhotonEmitter";
         let group = resources.groups.get(&self.device, label, &self.layout, &bound);

@@ -18,6 +18,7 @@ pub(crate) mod gpu {
         pub(crate) roulette_from: u32,
         pub(crate) sample_offset: u32,
         pub(crate) row: u32,
+        pub(crate) is_shared: u32,
     }
 }
 
@@ -28,7 +29,8 @@ pub(crate) const SLOTS: [Slot; 2] = [Slot::Uniform, Slot::StorageMut];
 /// walks it again for these. Then comes the next hop.
 #[derive(Debug, Clone, Copy)]
 pub struct SharedHop<'a> {
-    /// From 1 to the number of bounces. Others, and those that the tracer's resources have no room for, are left out.
+    /// From 1 to the number of bounces, and before them 0 where photons start on surfaces of lights. Others, and those that
+    /// the tracer's resources have no room for, are left out.
     pub number: u32,
     /// The paths lost at this hop, of those that it has room for.
     pub lost: &'a LostRays,
@@ -45,7 +47,7 @@ pub(super) struct PhotonWalk {
 /// Uniforms and bind groups.
 #[derive(Debug)]
 pub(super) struct PhotonWalkResources {
-    /// Of the whole walk, then of each shared hop: all hops of a frame are in one submission.
+    /// Of the whole walk, then of each shared hop from 0 on: all hops of a frame are in one submission.
     params: Vec<wgpu::Buffer>,
     groups: BindGroupCache,
 }
@@ -86,8 +88,8 @@ impl PhotonWalk {
     ) -> Option<PreparedWalk> {
         let bounces = inputs.photons.bounces();
         let (place, hops) = match inputs.shared {
-            None => (0, [1, bounces]),
-            Some(hop) if (1..=bounces).contains(&hop.number) => (hop.number as usize, [hop.number; 2]),
+            None => (0, [0, bounces]),
+            Some(hop) if hop.number <= bounces => (hop.number as usize + 1, [hop.number; 2]),
             Some(_) => return None,
         };
         let buffer = resources.params.get(place)?;
@@ -99,6 +101,7 @@ impl PhotonWalk {
             roulette_from: inputs.roulette_from,
             sample_offset: inputs.sample_offset,
             row,
+            is_shared: u32::from(inputs.shared.is_some()),
         };
         inputs.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&params));
         let bound = [buffer.into(), inputs.photons.buffer().into()];
@@ -111,9 +114,10 @@ impl PhotonWalk {
 }
 
 impl PhotonWalkResources {
-    /// For the whole walk and up to `shared_hops` shared ones.
+    /// For the whole walk and, if any are shared, hops 0 to `shared_hops`.
     pub(super) fn new(device: &wgpu::Device, label: &'static str, shared_hops: u32) -> Result<Self, Error> {
-        let params = (0..=shared_hops)
+        let uses = if shared_hops == 0 { 1 } else { shared_hops + 2 };
+        let params = (0..uses)
             .map(|_| device::uniform_buffer::<gpu::WalkParams>(device, label))
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Self {

@@ -1,17 +1,23 @@
-//! The punctual lights of a frame as the GPU sees them, and how many photons each of them emits.
+//! The lights and lamps of a frame as the GPU sees them, and how many photons each of them emits.
 
 use super::ShadowMaps;
 use super::view::axes_along;
-use crate::scene::{Light, LightKind, UnitFrame};
+use crate::scene::{EmissiveTriangle, Lamp, Light, LightKind, UnitFrame};
 use crate::{Error, gpu as device};
 use glam::{DVec3, Vec3};
 
-/// Most punctual lights a scene may have.
+/// Most lights a scene may have, lamps of emissive triangles counted and environments not.
 pub const MAX_LIGHTS: usize = 64;
 
 /// Share of the photon budget that is spread evenly, so that a dim lamp in a dark corner is not starved; the rest goes
 /// by flux.
 const EVEN_SHARE: f64 = 0.25;
+
+/// Direct light of a lamp of more triangles than this is that of the rectangle that stands for it.
+const MAX_DIRECT_POLYGONS: usize = 16;
+
+/// Shadow maps of flat lamps are taken from this far before them, in their extents, so that they do not see their own edges.
+const BEFORE_LAMP: f64 = 1.0 / 1024.0;
 
 /// Beyond this a lamp's extent is no larger: infinity times a distance of zero is no number.
 const LARGEST_EXTENT: f64 = 1e30;
@@ -19,10 +25,11 @@ const LARGEST_EXTENT: f64 = 1e30;
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
-    /// Kinds of [`LightRecord`]. Twins of `LIGHT_POINT`, `LIGHT_SPOT`, `LIGHT_DIRECTIONAL`.
+    /// Kinds of [`LightRecord`]. Twins of `LIGHT_POINT` and so on.
     pub(crate) const POINT: u32 = 0;
     pub(crate) const SPOT: u32 = 1;
     pub(crate) const DIRECTIONAL: u32 = 2;
+    pub(crate) const AREA: u32 = 3;
 
     /// Twin of `Light` in `shaders/common/light.wgsl`.
     #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -45,17 +52,35 @@ pub(crate) mod gpu {
         pub(crate) density: f32,
         pub(crate) disc_radius: f32,
         pub(crate) extent: f32,
-        pub(crate) _pad: [f32; 3],
+        pub(crate) first_polygon: u32,
+        pub(crate) direct_polygons: u32,
+        pub(crate) polygon_count: u32,
+    }
+
+    /// Twin of `Polygon` in `shaders/common/polygon.wgsl`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Polygon {
+        pub(crate) corner: [f32; 3],
+        pub(crate) corners: u32,
+        pub(crate) u: [f32; 3],
+        pub(crate) until: f32,
+        pub(crate) v: [f32; 3],
+        pub(crate) area: f32,
+        pub(crate) radiance: [f32; 3],
+        pub(crate) _pad: f32,
     }
 }
 
-/// All punctual lights of a frame ([`Light::is_punctual`]), in their order: an `array<Light>` of
-/// `shaders/common/light.wgsl`, intensities in the unit frame.
+/// All lights of a frame but environments, in their order, and behind them lamps made of emissive triangles: an `array<Light>`
+/// of `shaders/common/light.wgsl`, intensities in the unit frame, and the polygons of those that are flat.
 #[derive(Debug)]
 pub struct Lights {
+    device: wgpu::Device,
     buffer: wgpu::Buffer,
     written: Vec<gpu::LightRecord>,
-    bytes: u64,
+    polygons: wgpu::Buffer,
+    written_polygons: Vec<gpu::Polygon>,
 }
 
 impl Lights {
@@ -67,43 +92,60 @@ impl Lights {
         let bytes = (MAX_LIGHTS * size_of::<gpu::LightRecord>()) as u64;
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
         Ok(Self {
+            device: gpu.clone(),
             buffer: device::buffer(gpu, "lightfall::Lights", bytes, usage)?,
             written: Vec::new(),
-            bytes,
+            polygons: polygon_buffer(gpu, 1)?,
+            written_polygons: Vec::new(),
         })
     }
 
-    /// Uploads the punctual ones of this frame's lights. `photon_count` photons are divided among them: three quarters in
-    /// proportion to flux, one quarter evenly among those that shine. Shadow-map layers are numbered as [`ShadowMaps`]
-    /// does.
+    /// Uploads this frame's lights, environments left out, and its lamps. `photon_count` photons are divided among them: three
+    /// quarters in proportion to flux, one quarter evenly among those that shine. Shadow-map layers are numbered as
+    /// [`ShadowMaps`] does for [`Lamp::with_lights`].
     ///
     /// # Errors
-    /// [`Error::CountMismatch`] above [`MAX_LIGHTS`] punctual lights.
+    /// [`Error::CountMismatch`] above [`MAX_LIGHTS`] lights and lamps; [`Error::LimitExceeded`] for more triangles than a
+    /// storage buffer holds.
     pub fn write(
         &mut self,
         queue: &wgpu::Queue,
         frame: &UnitFrame,
         lights: &[Light],
+        lamps: &[Lamp],
         photon_count: u32,
     ) -> Result<(), Error> {
-        let punctual = lights.iter().filter(|l| l.is_punctual()).count();
-        if punctual > MAX_LIGHTS {
+        let found = lights.iter().filter(|l| !l.is_environment()).count() + lamps.len();
+        if found > MAX_LIGHTS {
             return Err(Error::CountMismatch {
-                what: "point, spot and directional lights (most a scene may have)",
+                what: "lights that are no environments, and lamps (most a scene may have)",
                 expected: MAX_LIGHTS,
-                found: punctual,
+                found,
             });
         }
-        let counts = divide_photons(frame, lights, photon_count);
-        let mut records = Vec::with_capacity(punctual);
+        let all = Lamp::with_lights(lights, lamps);
+        let counts = divide_photons(frame, &all, photon_count);
+        let (mut records, mut polygons) = (Vec::with_capacity(found), Vec::new());
         let (mut first_layer, mut first_photon) = (0, 0);
-        for (light, &count) in lights.iter().zip(&counts) {
-            let Some(record) = record(frame, light, first_layer, first_photon, count) else {
+        for (index, (light, &count)) in all.iter().zip(&counts).enumerate() {
+            let Some(mut record) = record(frame, light, first_layer, first_photon, count) else {
                 continue;
             };
+            if let LightKind::Rectangle { .. } = light.kind {
+                let lamp = index.checked_sub(lights.len()).map(|i| &lamps[i]);
+                add_polygons(frame, light, lamp, &mut record, &mut polygons);
+            }
             first_layer += record.layer_count;
             first_photon += count;
             records.push(record);
+        }
+        if polygons != self.written_polygons {
+            let bytes: &[u8] = bytemuck::cast_slice(&polygons);
+            if bytes.len() as u64 > self.polygons.size() {
+                self.polygons = polygon_buffer(&self.device, polygons.len().next_power_of_two())?;
+            }
+            queue.write_buffer(&self.polygons, 0, bytes);
+            self.written_polygons = polygons;
         }
         if records != self.written {
             queue.write_buffer(&self.buffer, 0, bytemuck::cast_slice(&records));
@@ -115,6 +157,16 @@ impl Lights {
     /// The records.
     pub fn buffer(&self) -> &wgpu::Buffer {
         &self.buffer
+    }
+
+    /// What flat ones are made of: an `array<Polygon>` of `shaders/common/polygon.wgsl`. Another buffer where there are more.
+    pub fn polygons(&self) -> &wgpu::Buffer {
+        &self.polygons
+    }
+
+    /// Whether photons start on a lamp's surface, from where their first hop is traced like any other.
+    pub fn have_area(&self) -> bool {
+        !self.written_polygons.is_empty()
     }
 
     /// Lights written.
@@ -134,16 +186,93 @@ impl Lights {
 
     /// Bytes this resource allocated.
     pub fn memory_use(&self) -> u64 {
-        self.bytes
+        self.buffer.size() + self.polygons.size()
     }
 }
 
-/// Photons per light, none for one that is not punctual; sums to `total` if any punctual light shines. Each of them that
+fn polygon_buffer(gpu: &wgpu::Device, count: usize) -> Result<wgpu::Buffer, Error> {
+    let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
+    let bytes = (count * size_of::<gpu::Polygon>()) as u64;
+    device::buffer(gpu, "lightfall::Lights::polygons", bytes, usage)
+}
+
+/// The polygons of a flat light, and which of them are what: those that direct light is of, then those that photons start on,
+/// unless these are the same.
+fn add_polygons(
+    frame: &UnitFrame,
+    light: &Light,
+    lamp: Option<&Lamp>,
+    record: &mut gpu::LightRecord,
+    polygons: &mut Vec<gpu::Polygon>,
+) {
+    let first = polygons.len();
+    let triangles = lamp.map_or(&[][..], |l| &l.triangles);
+    if triangles.is_empty() || triangles.len() > MAX_DIRECT_POLYGONS {
+        polygons.extend(parallelogram(frame, light));
+    }
+    record.direct_polygons = (polygons.len() - first) as u32;
+    let flux: f64 = triangles.iter().map(EmissiveTriangle::flux).sum();
+    let mut so_far = 0.0;
+    polygons.extend(triangles.iter().map(|triangle| {
+        so_far += triangle.flux();
+        triangle_polygon(frame, triangle, so_far / flux)
+    }));
+    record.first_polygon = first as u32;
+    record.polygon_count = (polygons.len() - first) as u32;
+    if record.direct_polygons == 0 {
+        record.direct_polygons = record.polygon_count;
+    }
+}
+
+fn parallelogram(frame: &UnitFrame, light: &Light) -> Option<gpu::Polygon> {
+    let LightKind::Rectangle { center, half_u, half_v } = light.kind else {
+        return None;
+    };
+    let corner = center - half_u - half_v;
+    Some(polygon(
+        frame,
+        4,
+        [corner, 2.0 * half_u, 2.0 * half_v],
+        1.0,
+        light.strength(),
+        1.0,
+    ))
+}
+
+fn triangle_polygon(frame: &UnitFrame, triangle: &EmissiveTriangle, until: f64) -> gpu::Polygon {
+    let [a, b, c] = triangle.corners;
+    let radiance = Vec3::from(triangle.radiance).as_dvec3();
+    polygon(frame, 3, [a, b - a, c - a], 0.5, radiance, until)
+}
+
+/// `place`: a corner and the two sides that meet there; `share`: of the parallelogram that they span.
+fn polygon(
+    frame: &UnitFrame,
+    corners: u32,
+    place: [DVec3; 3],
+    share: f64,
+    radiance: DVec3,
+    until: f64,
+) -> gpu::Polygon {
+    let [u, v] = [place[1], place[2]].map(|side| side / frame.length_scale());
+    gpu::Polygon {
+        corner: frame.point(place[0]).to_array(),
+        corners,
+        u: u.as_vec3().to_array(),
+        until: until as f32,
+        v: v.as_vec3().to_array(),
+        area: (share * u.cross(v).length()) as f32,
+        radiance: frame.radiance(radiance).to_array(),
+        _pad: 0.0,
+    }
+}
+
+/// Photons per light, none for an environment; sums to `total` if any other light shines. Each of them that
 /// shines gets one before the rest is divided; with fewer photons than lights the last ones get none, and their light is
 /// missing.
 fn divide_photons(frame: &UnitFrame, lights: &[Light], total: u32) -> Vec<u32> {
     let region_radius = f64::from(frame.radius()) * frame.length_scale();
-    let flux_of = |l: &Light| l.is_punctual().then(|| l.flux(region_radius).element_sum());
+    let flux_of = |l: &Light| (!l.is_environment()).then(|| l.flux(region_radius).element_sum());
     let flux: Vec<f64> = lights.iter().map(|l| flux_of(l).unwrap_or(0.0)).collect();
     let all: f64 = flux.iter().sum();
     let shining = flux.iter().filter(|&&f| f > 0.0).count() as f64;
@@ -168,7 +297,7 @@ fn divide_photons(frame: &UnitFrame, lights: &[Light], total: u32) -> Vec<u32> {
         .collect()
 }
 
-/// `None` for a light that is not punctual.
+/// `None` for an environment. Polygons are left to be added.
 fn record(
     frame: &UnitFrame,
     light: &Light,
@@ -185,6 +314,15 @@ fn record(
     let mut density = 1.0 / light.effective_solid_angle().max(f64::MIN_POSITIVE);
     let extent;
     match light.kind {
+        LightKind::Rectangle { center, half_u, half_v } => {
+            kind = gpu::AREA;
+            // The disc of its area.
+            let radius = (4.0 * half_u.cross(half_v).length() / std::f64::consts::PI).sqrt();
+            position = frame.point(eye_before(light).unwrap_or(center));
+            intensity = frame.radiance(light.strength());
+            density = std::f64::consts::FRAC_1_PI;
+            extent = radius / frame.length_scale();
+        }
         LightKind::Point { position: p, radius } => {
             position = frame.point(p);
             extent = radius / frame.length_scale();
@@ -209,7 +347,7 @@ fn record(
             let radius = f64::from(frame.radius());
             density = 1.0 / (std::f64::consts::PI * radius * radius);
         }
-        LightKind::Rectangle { .. } | LightKind::Environment { .. } => return None,
+        LightKind::Environment { .. } => return None,
     }
     Some(gpu::LightRecord {
         position: position.to_array(),
@@ -229,8 +367,19 @@ fn record(
         density: density as f32,
         disc_radius: frame.radius(),
         extent: extent.min(LARGEST_EXTENT) as f32,
-        _pad: [0.0; 3],
+        first_polygon: 0,
+        direct_polygons: 0,
+        polygon_count: 0,
     })
+}
+
+/// Where a flat light's shadow maps are taken from, world space: a little before its middle.
+pub(super) fn eye_before(light: &Light) -> Option<DVec3> {
+    let LightKind::Rectangle { center, half_u, half_v } = light.kind else {
+        return None;
+    };
+    let front = half_u.cross(half_v);
+    Some(center + BEFORE_LAMP * front.length().sqrt() * front.normalize())
 }
 
 /// How a light looks at the scene: along which axis, how wide, with how many layers.

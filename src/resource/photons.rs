@@ -14,7 +14,8 @@ pub struct Photon {
     /// Where the hop ended, unit frame.
     pub position: [f32; 3],
     /// Low two bits: a [`PhotonState`]. Bit 8: the path came straight from its light. Bit 9: the tracer is not sure of the
-    /// hop. Bits 16 to 31, the same for all hops of a path, and 0 after its end: see [`EmissionCells`](super::EmissionCells); bits 16 to 23 are the
+    /// hop. Bit 10: the hop begins here, at a light's surface, and is still to be traced; `position`, `normal` and `direction` are those of its start.
+    /// Bits 16 to 31, the same for all hops of a path, and 0 after its end: see [`EmissionCells`](super::EmissionCells); bits 16 to 23 are the
     /// cell that it started in, bits 24 to 31 b where photons start 2^((b − 128) / 16) times as densely there as if they were
     /// spread evenly, 0 where they are. Others 0.
     pub state: u32,
@@ -53,6 +54,9 @@ impl Photon {
     pub const FIRST_HIT: u32 = 256;
     /// Bit of `state` that marks a hop of which the tracer is not sure: a surer one should walk it again.
     pub const TENTATIVE: u32 = 512;
+
+    /// Bit of `state` that marks a photon on the surface of a light, whose first hop is not traced yet.
+    pub const STARTED: u32 = 1024;
 
     pub(crate) const BOOST_ONE: f32 = 128.0;
     pub(crate) const BOOST_STEPS: f32 = 16.0;

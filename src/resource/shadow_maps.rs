@@ -1,7 +1,7 @@
 //! Reflective shadow maps: what each light sees. They answer both where direct light falls and where photons first land.
 
 use super::env_maps::SURFACE_FORMAT;
-use super::lights::LightShape;
+use super::lights::{LightShape, eye_before};
 use super::view::axes_along;
 use super::{CaptureMask, CapturePurpose, CaptureView};
 use crate::scene::{Light, LightKind, UnitFrame};
@@ -14,8 +14,8 @@ const WIDEST_SINGLE_FACE: f64 = std::f64::consts::FRAC_PI_3;
 /// Texels beyond the edge of a light's cone or region, so that no look-up falls off the map.
 const MARGIN: f64 = 1.0 / 64.0;
 
-/// Layers of one `rgba32uint` 2D array in the order of the punctual lights ([`Light::is_punctual`]): six cube faces for a
-/// point light or a wide spot, one perspective face for a spot, one parallel face over the region for a directional light.
+/// Layers of one `rgba32uint` 2D array in the order of the lights, environments left out: six cube faces for a
+/// point light, a wide spot or a rectangle (from just before its middle), one perspective face for a spot, one parallel face over the region for a directional light.
 /// Texels as in [`EnvMaps`](super::EnvMaps); distances are from the light (parallel ones from a plane 2 unit-frame lengths
 /// before the region's centre).
 #[derive(Debug)]
@@ -82,13 +82,17 @@ impl ShadowMaps {
                         views.extend((0..6).map(|f| CaptureView::cube_face(purpose, mask, eye, f, self.size)));
                     }
                 }
-                LightKind::Rectangle { .. } | LightKind::Environment { .. } => {}
+                LightKind::Rectangle { center, .. } => {
+                    let eye = frame.point(eye_before(light).unwrap_or(center));
+                    views.extend((0..6).map(|f| CaptureView::cube_face(purpose, mask, eye, f, self.size)));
+                }
+                LightKind::Environment { .. } => {}
             }
         }
         views
     }
 
-    /// How a light looks at the scene; `None` for one that is not punctual.
+    /// How a light looks at the scene; `None` for an environment.
     pub(super) fn light_shape(frame: &UnitFrame, light: &Light) -> Option<LightShape> {
         let (direction, half_extent) = match light.kind {
             LightKind::Point { .. } => (DVec3::NEG_Y, 1.0),
@@ -97,7 +101,8 @@ impl ShadowMaps {
             } if outer_angle <= WIDEST_SINGLE_FACE => (direction, outer_angle.tan() * (1.0 + MARGIN)),
             LightKind::Spot { direction, .. } => (direction, 1.0),
             LightKind::Directional { direction, .. } => (direction, f64::from(frame.radius()) * (1.0 + MARGIN)),
-            LightKind::Rectangle { .. } | LightKind::Environment { .. } => return None,
+            LightKind::Rectangle { half_u, half_v, .. } => (half_u.cross(half_v), 1.0),
+            LightKind::Environment { .. } => return None,
         };
         Some(LightShape {
             direction,
@@ -129,9 +134,9 @@ impl ShadowMaps {
 
 fn layers_of(kind: &LightKind) -> u32 {
     match kind {
-        LightKind::Point { .. } => 6,
+        LightKind::Point { .. } | LightKind::Rectangle { .. } => 6,
         LightKind::Spot { outer_angle, .. } if *outer_angle > WIDEST_SINGLE_FACE => 6,
         LightKind::Spot { .. } | LightKind::Directional { .. } => 1,
-        LightKind::Rectangle { .. } | LightKind::Environment { .. } => 0,
+        LightKind::Environment { .. } => 0,
     }
 }

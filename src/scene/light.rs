@@ -122,13 +122,9 @@ impl Light {
         self.strength() * per_strength
     }
 
-    /// Whether the light is of a kind that `KHR_lights_punctual` has: point, spot or directional. The image-space passes
-    /// model these, and pass over the others.
-    pub fn is_punctual(&self) -> bool {
-        match self.kind {
-            LightKind::Point { .. } | LightKind::Spot { .. } | LightKind::Directional { .. } => true,
-            LightKind::Rectangle { .. } | LightKind::Environment { .. } => false,
-        }
+    /// Whether light comes from all around. The image-space passes model all other kinds, and pass over this one.
+    pub fn is_environment(&self) -> bool {
+        matches!(self.kind, LightKind::Environment { .. })
     }
 
     /// Whether the light has an extent, and so a penumbra.

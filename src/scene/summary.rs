@@ -1,6 +1,6 @@
 //! What a scene holds, in the few numbers that decide which stages it needs.
 
-use super::{Light, Scene, SceneBounds};
+use super::{EmissiveTriangle, Light, Scene, SceneBounds};
 use crate::Error;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -18,10 +18,12 @@ pub struct SceneSummary {
     pub total_flux: f64,
     /// Lights without geometry, of all kinds.
     pub lights: usize,
-    /// Those of them that are not punctual: rectangles and environments ([`Light::is_punctual`]).
-    pub lights_not_punctual: usize,
-    /// Punctual lights with an extent, hence a penumbra.
+    /// Those of them that are environments ([`Light::is_environment`]).
+    pub environment_lights: usize,
+    /// Lights with an extent, hence a penumbra, environments left out.
     pub lights_with_extent: usize,
+    /// What shines with geometry. A host that leaves it empty has emissive surfaces that shine for the eye alone.
+    pub emissive_triangles: Vec<EmissiveTriangle>,
     /// Whether any surface reflects light at all.
     pub has_reflecting_surfaces: bool,
     /// Names of emitting materials in use.
@@ -36,7 +38,7 @@ impl SceneSummary {
     /// Checks the numbers, which a host may have filled in by hand, against the lights given with them.
     ///
     /// # Errors
-    /// [`Error::InvalidScene`]; [`Error::CountMismatch`] if there are not as many lights, or not as many punctual ones, as it
+    /// [`Error::InvalidScene`]; [`Error::CountMismatch`] if there are not as many lights, or not as many environments, as it
     /// says.
     pub fn validate(&self, lights: &[Light]) -> Result<(), Error> {
         let error = |field: &str, value: f64| {
@@ -49,13 +51,23 @@ impl SceneSummary {
         if !(self.total_flux >= 0.0 && self.total_flux.is_finite()) {
             return error("total_flux", self.total_flux);
         }
-        let not_punctual = count_not_punctual(lights);
+        let bad_triangle = self.emissive_triangles.iter().position(|t| !t.flux().is_finite());
+        if let Some(index) = bad_triangle {
+            let problem = "has corners, or a radiance, that are not finite".to_owned();
+            return Err(Error::scene(
+                "summary",
+                "scene",
+                &format!("emissive_triangles[{index}]"),
+                problem,
+            ));
+        }
+        let environments = count_environments(lights);
         for (what, expected, found) in [
             ("lights beside a summary that counted them", self.lights, lights.len()),
             (
-                "rectangle and environment lights beside a summary that counted them",
-                self.lights_not_punctual,
-                not_punctual,
+                "environment lights beside a summary that counted them",
+                self.environment_lights,
+                environments,
             ),
         ] {
             if expected != found {
@@ -65,9 +77,9 @@ impl SceneSummary {
         Ok(())
     }
 
-    /// Lights that the image-space passes model.
-    pub fn punctual_lights(&self) -> usize {
-        self.lights.saturating_sub(self.lights_not_punctual)
+    /// Whether anything shines that the image-space passes model: a light that is no environment, or a surface.
+    pub fn is_lit(&self) -> bool {
+        self.lights > self.environment_lights || !self.emissive_triangles.is_empty()
     }
 
     /// Reads it off a scene.
@@ -105,12 +117,13 @@ impl SceneSummary {
             triangles: scene.triangle_count(),
             total_flux,
             lights: scene.lights.len(),
-            lights_not_punctual: count_not_punctual(&scene.lights),
+            environment_lights: count_environments(&scene.lights),
             lights_with_extent: scene
                 .lights
                 .iter()
-                .filter(|l| l.is_punctual() && l.has_extent())
+                .filter(|l| !l.is_environment() && l.has_extent())
                 .count(),
+            emissive_triangles: EmissiveTriangle::all_of(scene),
             has_reflecting_surfaces: !names(|m| m.base_color.iter().any(|&c| c > 0.0)).is_empty(),
             emissive: names(super::Material::is_emissive),
             metals: names(super::Material::is_metal),
@@ -119,8 +132,8 @@ impl SceneSummary {
     }
 }
 
-fn count_not_punctual(lights: &[Light]) -> usize {
-    lights.iter().filter(|l| !l.is_punctual()).count()
+fn count_environments(lights: &[Light]) -> usize {
+    lights.iter().filter(|l| l.is_environment()).count()
 }
 
 fn instance_area(scene: &Scene, instance: &super::Instance) -> f64 {

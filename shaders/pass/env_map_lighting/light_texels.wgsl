@@ -9,6 +9,7 @@
 @group(0) @binding(5) var<storage, read> lights: array<Light>;
 @group(0) @binding(6) var shadow_maps: texture_2d_array<u32>;
 @group(0) @binding(7) var irradiance: texture_storage_2d_array<rgba32float, write>;
+@group(0) @binding(8) var<storage, read> polygons: array<Polygon>;
 
 alias Receivers = f32;
 alias Surfaces = u32;

@@ -2,7 +2,7 @@
 
 struct WalkParams {
     photon_count: u32,
-    // Walked are these hops and those between them
+    // Walked are these hops and those between them; hop 0 only where photons start on surfaces of lights
     first_hop: u32,
     last_hop: u32,
     // First scattering that Russian roulette may end
@@ -10,4 +10,6 @@ struct WalkParams {
     sample_offset: u32,
     // Invocations in a row of the dispatch over all paths
     row: u32,
+    // 1: another tracer walks again what is lost or not certain
+    is_shared: u32,
 }

@@ -25,25 +25,21 @@ fn scatter_flux(photon: Photon, bounce: u32, sequence_index: u32) -> vec3f {
     return scattered / survival;
 }
 
-// One hop from a stored photon.
-fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) -> Photon {
-    let light = photon_light(photon.light_and_surface);
-    let kept = photon.state & PHOTON_EMISSION;
-    let normal = octahedral_unpack(photon.normal);
-    let local = sampling_cosine(random_pair(sequence_index, 2u * bounce));
-    let direction = normalize(sampling_frame(normal) * local);
-    let hit = trace_ray(photon.position, normal, direction);
+// What a hop arrives as that left `origin` in this direction, which is drawn with `density` per solid angle.
+fn arrived(origin: Photon, flux: vec3f, direction: vec3f, density: f32, hit: Hit) -> Photon {
+    let light = photon_light(origin.light_and_surface);
+    let kept = origin.state & PHOTON_EMISSION;
     if hit.kind != HIT_SURFACE && hit.kind != HIT_TENTATIVE {
         let fate = select(PHOTON_LOST, PHOTON_ESCAPED, hit.kind == HIT_ESCAPED);
         return photon_gone(fate | kept, flux, direction, light);
     }
-    let cosines = local.z * max(0.0, -dot(hit.normal, direction));
+    let cosine = max(0.0, -dot(hit.normal, direction));
     let distance = max(hit.distance, WALK_SHORTEST);
     return Photon(
         hit.position,
         select(PHOTON_STORED, PHOTON_STORED | PHOTON_TENTATIVE, hit.kind == HIT_TENTATIVE) | kept,
         flux,
-        WALK_INVERSE_PI * cosines / (distance * distance),
+        density * cosine / (distance * distance),
         octahedral_pack(hit.normal),
         octahedral_pack(direction),
         reflectance_pack(hit.reflectance),
@@ -51,11 +47,42 @@ fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) ->
     );
 }
 
+// One hop from a stored photon.
+fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) -> Photon {
+    let normal = octahedral_unpack(photon.normal);
+    let local = sampling_cosine(random_pair(sequence_index, 2u * bounce));
+    let direction = normalize(sampling_frame(normal) * local);
+    let hit = trace_ray(photon.position, normal, direction);
+    return arrived(photon, flux, direction, WALK_INVERSE_PI * local.z, hit);
+}
+
+// The first hop of a photon that stands on the surface of a light.
+fn first_photon(start: Photon) -> Photon {
+    let normal = octahedral_unpack(start.normal);
+    let direction = octahedral_unpack(start.direction);
+    let hit = trace_ray(start.position, normal, direction);
+    if hit.kind == HIT_LOST || (hit.kind == HIT_TENTATIVE && walk.is_shared == 1u) {
+        // Where it started is not forgotten: another tracer sets out from there.
+        var lost = start;
+        lost.state = (start.state & ~PHOTON_STATE_MASK) | PHOTON_LOST;
+        return lost;
+    }
+    let density = start.density * WALK_INVERSE_PI * max(0.0, dot(normal, direction));
+    var photon = arrived(start, start.flux, direction, density, hit);
+    photon.state |= PHOTON_FIRST_HIT;
+    return photon;
+}
+
 // The hops of one path. A hop depends on the one before it alone, so that walking them one at a time is the same.
 fn walk_path(index: u32) {
     let sequence_index = walk.sample_offset + index;
-    var photon = photons[(walk.first_hop - 1u) * walk.photon_count + index];
-    for (var bounce = walk.first_hop; bounce <= walk.last_hop; bounce++) {
+    let scattered_from = max(walk.first_hop, 1u);
+    var photon = photons[(scattered_from - 1u) * walk.photon_count + index];
+    if walk.first_hop == 0u && (photon.state & PHOTON_STARTED) != 0u {
+        photon = first_photon(photon);
+        photons[index] = photon;
+    }
+    for (var bounce = scattered_from; bounce <= walk.last_hop; bounce++) {
         let slot = bounce * walk.photon_count + index;
         var flux = vec3f(0.0);
         if (photon.state & PHOTON_STATE_MASK) == PHOTON_STORED {
