@@ -14,13 +14,15 @@ struct ShadowProbe {
     // Of the receiver, along the ray
     distance: f32,
     texel: vec2u,
-    // False: no texel looks there, and nothing is in the way
+    // False: no texel looks there, or light does not come that way; nothing is in the way
     is_inside: bool,
 }
 
 fn shadow_probe(light: Light, p: vec3f, map_size: u32) -> ShadowProbe {
     let ray = light_ray_to(light, p);
-    let is_inside = all(ray.uv >= vec2f(0.0)) && all(ray.uv <= vec2f(1.0));
+    var is_inside = all(ray.uv >= vec2f(0.0)) && all(ray.uv <= vec2f(1.0));
+    // Behind a flat lamp there is no light that anything could be in the way of, but the lamp itself is seen.
+    is_inside = is_inside && (light.kind != LIGHT_AREA || dot(ray.direction, light.direction) > 0.0);
     return ShadowProbe(ray, dot(p - ray.origin, ray.direction), cube_face_texel(ray.uv, map_size), is_inside);
 }
 
