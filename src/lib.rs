@@ -109,7 +109,7 @@
 //!
 //! # What is not modelled
 //!
-//! Every surface is Lambertian; emissive surfaces shine for the eye and light nothing.
+//! Every surface is Lambertian, and environments light nothing.
 //! [`Plan::simplifications`](frame::Plan::simplifications) names what this means for a given scene.
 
 #![cfg_attr(docsrs, feature(doc_cfg))]

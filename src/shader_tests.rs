@@ -234,7 +234,7 @@ fn twins() -> Vec<Twin> {
             transform, normal_transform, material, mirrored, surface, _pad,
         }),
         twin!(wgsl::MESH_GEOMETRY, "Material", mesh_geometry::gpu::MeshMaterial {
-            base_color, alpha_cutoff, emission, _pad,
+            base_color, alpha_cutoff, emission, metallic, roughness, transmission, index_of_refraction, _pad,
         }),
         twin!(wgsl::PHOTON_EMITTER, "Params", photon_emitter::gpu::Params {
             photon_count, light_count, sample_offset, shadow_map_size, row,
@@ -245,7 +245,7 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "ListParams", image_space_tracer::gpu::ListParams { ray_count, row }),
         twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "SurfaceRay", SurfaceRay { position, normal, direction, pad }),
         twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "SurfaceHit", SurfaceHit {
-            distance, kind, normal, reflectance, fetches, maps, steps, pad,
+            distance, kind, normal, reflectance, fetches, maps, steps, lobe,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "WalkParams", photon_walk::gpu::WalkParams {
             photon_count, first_hop, last_hop, roulette_from, sample_offset, row, is_shared,

@@ -15,6 +15,7 @@ macro_rules! compose {
 /// `surface_texel_`, `surface_capture_`, `octahedral_` and `reflectance_`.
 pub const CAPTURE: &str = compose![
     "common/surface_texel.wgsl",
+    "common/lobe.wgsl",
     "common/surface_capture.wgsl",
     "common/octahedral.wgsl",
     "common/reflectance.wgsl",
@@ -26,6 +27,7 @@ pub(crate) const MESH_GEOMETRY: &str = compose![
     "common/surface_capture.wgsl",
     "common/octahedral.wgsl",
     "common/reflectance.wgsl",
+    "common/lobe.wgsl",
 ];
 
 pub(crate) const PHOTON_EMITTER: &str = compose![
@@ -43,6 +45,8 @@ pub(crate) const PHOTON_EMITTER: &str = compose![
     "common/random.wgsl",
     "common/halton.wgsl",
     "common/hash.wgsl",
+    "common/lobe.wgsl",
+    "common/hit.wgsl",
 ];
 
 pub(crate) const EMISSION_IMPORTANCE_COUNT: &str = compose![
@@ -113,6 +117,10 @@ pub(crate) const IMAGE_SPACE_TRACER: &str = compose![
     "common/random.wgsl",
     "common/halton.wgsl",
     "common/hash.wgsl",
+    "common/lobe.wgsl",
+    "common/scatter.wgsl",
+    "common/ggx.wgsl",
+    "common/fresnel.wgsl",
 ];
 
 pub(crate) const IMAGE_SPACE_TRACER_LIST: &str = compose![
@@ -141,6 +149,10 @@ pub(crate) const BVH_TRACER: &str = compose![
     "common/random.wgsl",
     "common/halton.wgsl",
     "common/hash.wgsl",
+    "common/lobe.wgsl",
+    "common/scatter.wgsl",
+    "common/ggx.wgsl",
+    "common/fresnel.wgsl",
 ];
 
 #[cfg(feature = "bvh")]
@@ -150,6 +162,7 @@ pub(crate) const BVH_TRACER_RAYS: &str = compose![
     "common/bvh.wgsl",
     "common/bvh_surface.wgsl",
     "common/octahedral.wgsl",
+    "common/lobe.wgsl",
 ];
 
 #[cfg(feature = "bvh")]
@@ -163,6 +176,7 @@ pub(crate) const BVH_TRACER_SURFACE_RAYS: &str = compose![
     "common/hit.wgsl",
     "common/octahedral.wgsl",
     "common/reflectance.wgsl",
+    "common/lobe.wgsl",
 ];
 
 pub(crate) const PHOTON_SPLATTER_RECEIVERS: &str = compose![
@@ -498,7 +512,8 @@ pub(crate) const TRACE_STATISTICS: &str = compose![
 pub(crate) const PATH_TRACER: &str = compose![
     "reference/path_tracer/trace_paths.wgsl",
     "reference/path_tracer/emitters.wgsl",
-    "reference/path_tracer/scatter.wgsl",
+    "reference/path_tracer/scatterer.wgsl",
+    "common/scatter.wgsl",
     "pass/bvh_tracer/bindings.wgsl",
     "common/bvh.wgsl",
     "common/bvh_surface.wgsl",
@@ -507,6 +522,7 @@ pub(crate) const PATH_TRACER: &str = compose![
     "common/octahedral.wgsl",
     "common/sampling.wgsl",
     "common/hash.wgsl",
+    "common/lobe.wgsl",
 ];
 
 #[cfg(all(feature = "bvh", feature = "reference"))]
@@ -519,6 +535,7 @@ pub(crate) const BVH_FUNCTIONS: &str = compose![
     "common/bvh.wgsl",
     "common/bvh_surface.wgsl",
     "common/octahedral.wgsl",
+    "common/lobe.wgsl",
 ];
 
 /// Every composed module, by the name of its pass; for validation and for tools.
@@ -578,6 +595,7 @@ pub const COMMON: &str = compose![
     "common/depth_range.wgsl",
     "common/lost_rays.wgsl",
     "common/photon.wgsl",
+    "common/polygon.wgsl",
     "common/subsampling.wgsl",
     "common/octahedral.wgsl",
     "common/reflectance.wgsl",

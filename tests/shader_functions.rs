@@ -1051,3 +1051,96 @@ fn hops_to_walk_again_are_those_that_are_lost_or_tentative() {
         assert_eq!(photon.is_unresolved(), state & 3 == 3 || state & 512 != 0, "{state}");
     }
 }
+
+/// Of a front of radiance 1 at p with normal n, by the midpoint rule over a parallelogram or its first half.
+fn flat_irradiance(corner: DVec3, [u, v]: [DVec3; 2], is_triangle: bool, p: DVec3, n: DVec3) -> f64 {
+    const STEPS: u32 = 300;
+    let front = u.cross(v).normalize();
+    let cell = u.cross(v).length() / f64::from(STEPS * STEPS);
+    let mut sum = 0.0;
+    for i in 0..STEPS {
+        for j in 0..STEPS {
+            let [a, b] = [i, j].map(|k| (f64::from(k) + 0.5) / f64::from(STEPS));
+            // The diagonal halves the cells that it crosses.
+            let share = match i + j + 1 {
+                _ if !is_triangle => 1.0,
+                k if k < STEPS => 1.0,
+                STEPS => 0.5,
+                _ => 0.0,
+            };
+            let way = corner + a * u + b * v - p;
+            let direction = way.normalize();
+            let cosines = n.dot(direction).max(0.0) * (-front.dot(direction)).max(0.0);
+            sum += share * cell * cosines / way.length_squared();
+        }
+    }
+    sum
+}
+
+#[test]
+fn a_polygon_gives_the_light_that_all_its_points_give_together() {
+    let Some(gpu) = gpu() else { return };
+    let corner = DVec3::new(-0.5, 1.0, -0.25);
+    let sides = [DVec3::new(0.25, 0.0, 1.0), DVec3::new(1.0, 0.25, 0.0)];
+    let middle = corner + 0.5 * (sides[0] + sides[1]);
+    // Around the front, behind it, and up to where it counts as a point.
+    let mut random = Random(31);
+    let near = (0..150).map(|_| middle + 0.3 * DVec3::NEG_Y + 1.5 * random.direction());
+    let mut points: Vec<DVec3> = near.collect();
+    points.extend((0..50).map(|_| middle + 200.0 * (random.direction() - 0.5 * DVec3::Y)));
+    points.extend((0..50).map(|_| middle + 400.0 * (random.direction() - 0.5 * DVec3::Y)));
+    // The normal is made of the fourth number, in the shader and here.
+    let inputs: Vec<[f32; 4]> = points
+        .iter()
+        .map(|p| p.as_vec3().extend(2.0 * random.unit() - 1.0).to_array())
+        .collect();
+    for (corners, is_triangle) in [(3, true), (4, false)] {
+        let body = format!(
+            "let n = normalize(vec3f(input.w, 1.0 - input.w * input.w, 0.5 * input.w + 0.25));
+            let polygon = Polygon(
+                vec3f(-0.5, 1.0, -0.25), {corners}u, vec3f(0.25, 0.0, 1.0), 1.0, vec3f(1.0, 0.25, 0.0), 1.0, vec3f(1.0),
+            );
+            let area = select(1.0, 0.5, {is_triangle}) * length(cross(polygon.u, polygon.v));
+            let sized = Polygon(polygon.corner, polygon.corners, polygon.u, 1.0, polygon.v, area, polygon.radiance);
+            return vec4f(polygon_irradiance(sized, input.xyz, n));"
+        );
+        let outputs = run(&gpu, &body, &inputs);
+        let (mut worst, mut lit, mut cut) = (0.0, 0, 0);
+        for (input, output) in inputs.iter().zip(&outputs) {
+            let (p, w) = (vec3(*input), f64::from(input[3]));
+            let n = DVec3::new(w, 1.0 - w * w, 0.5 * w + 0.25).normalize();
+            let expected = flat_irradiance(corner, sides, is_triangle, p, n);
+            let whole = sides[0].cross(sides[1]).length() / (middle - p).length_squared();
+            // Against what it could be at most: near the horizon all of it goes to zero.
+            let error = (f64::from(output[0]) - expected).abs() / whole.min(PI);
+            assert!(error < 1e-3, "{p} {n}: {} of {expected}", output[0]);
+            worst = error.max(worst);
+            lit += u32::from(expected > 0.0);
+            let heights = [DVec3::ZERO, sides[0], sides[1]].map(|c| n.dot(corner + c - p) > 0.0);
+            cut += u32::from(expected > 0.0 && heights.contains(&true) && heights.contains(&false));
+        }
+        println!("{corners} corners: {lit} lit, {cut} cut by the horizon, worst {worst:.2e} of the most");
+        assert!(lit > 80 && cut > 5, "{lit}, {cut}");
+    }
+}
+
+#[test]
+fn the_additive_recurrence_fills_the_square_evenly() {
+    let Some(gpu) = gpu() else { return };
+    let inputs: Vec<[u32; 4]> = (0..4096).map(|i| [i, 0, 0, 0]).collect();
+    let outputs = run(&gpu, "return vec4f(random_recurrence(input.x), 0.0, 0.0);", &inputs);
+    // In 16 × 16 cells 16 points each; by chance some cells would hold fewer than 7 or more than 27.
+    let mut counts = [0; 256];
+    for output in &outputs {
+        assert!(output[..2].iter().all(|x| (0.0..1.0).contains(x)));
+        counts[(16.0 * output[0]) as usize * 16 + (16.0 * output[1]) as usize] += 1;
+    }
+    let (least, most) = (counts.iter().min().unwrap(), counts.iter().max().unwrap());
+    assert!(*least >= 12 && *most <= 20, "{least} to {most} points a cell");
+    let exact = |alpha: u64, i: u64| ((alpha * i) as u32 >> 8) as f32 / (1 << 24) as f32;
+    assert!(
+        (0..)
+            .zip(&outputs)
+            .all(|(i, o)| o[0] == exact(3_242_174_889, i) && o[1] == exact(2_447_445_414, i))
+    );
+}

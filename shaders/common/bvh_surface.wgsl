@@ -126,6 +126,17 @@ fn bvh_base_color(surface: BvhSurface) -> vec3f {
     return bvh_materials[material].base_color * texel.rgb;
 }
 
+fn bvh_lobe(surface: BvhSurface) -> u32 {
+    let m = surface.material;
+    let rough_metallic = bvh_texture(bvh_materials[m].metallic_roughness_texture, surface.tex_coord).gb;
+    return lobe_of(
+        bvh_materials[m].metallic * rough_metallic.y,
+        bvh_materials[m].roughness * rough_metallic.x,
+        bvh_materials[m].transmission,
+        bvh_materials[m].index_of_refraction,
+    );
+}
+
 fn bvh_emission(surface: BvhSurface) -> vec3f {
     let material = surface.material;
     let texel = bvh_texture(bvh_materials[material].emission_texture, surface.tex_coord);

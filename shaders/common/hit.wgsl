@@ -18,8 +18,13 @@ struct Hit {
     reflectance: vec3f,
     // The surface hit, 0: none in particular
     surface: u32,
+    // How it scatters (lobe.wgsl), and HIT_BACK
+    lobe: u32,
 }
 
+// Beside a lobe: the back of a surface is hit, as from inside a body.
+const HIT_BACK: u32 = 0x4000u;
+
 fn hit_nothing(kind: u32) -> Hit {
-    return Hit(kind, 0.0, vec3f(0.0), vec3f(0.0), vec3f(0.0), 0u);
+    return Hit(kind, 0.0, vec3f(0.0), vec3f(0.0), vec3f(0.0), 0u, 0u);
 }

@@ -10,6 +10,11 @@ const PHOTON_TENTATIVE: u32 = 512u;
 // On the surface of a light, before its first hop: position, normal and direction are those of its start, the density is how
 // much more densely photons start this way. Stays on a first hop that is lost or, while another tracer follows, not certain.
 const PHOTON_STARTED: u32 = 1024u;
+// How the surface scatters (lobe.wgsl): bits 2 to 7 are bits 0 to 5 of the lobe, the kind among them; bits 8 to 15 of
+// `light_and_surface` are the others. And whether its back was hit.
+const PHOTON_LOBE_SHIFT: u32 = 2u;
+const PHOTON_LOBE_KIND: u32 = 12u;
+const PHOTON_BACK: u32 = 2048u;
 // What a path keeps from its emission: bits 16 to 23 the cell that it started in, bits 24 to 31 how much more densely photons
 // start there than if they were spread evenly, 0 if they are.
 const PHOTON_EMISSION: u32 = 0xffff0000u;
@@ -20,11 +25,12 @@ struct Photon {
     position: vec3f,
     state: u32,
     flux: vec3f,
+    // On a specular surface photon_footprint instead: its radius here, and how much it grows in a unit of length
     density: f32,
     normal: u32,
     direction: u32,
     reflectance: u32,
-    // Bits 0 to 15 the light that the path began at, 16 to 31 the surface, 0: none in particular
+    // Bits 0 to 7 the light that the path began at, 16 to 31 the surface, 0: none in particular
     light_and_surface: u32,
 }
 
@@ -33,7 +39,20 @@ fn photon_emission(cell: u32, boost: f32) -> u32 {
 }
 
 fn photon_light(light_and_surface: u32) -> u32 {
-    return light_and_surface & 0xffffu;
+    return light_and_surface & 0xffu;
+}
+
+// Bits of `state`, and of `light_and_surface`, of a hit's lobe.
+fn photon_lobe_state(lobe: u32) -> u32 {
+    return ((lobe & 63u) << PHOTON_LOBE_SHIFT) | select(0u, PHOTON_BACK, (lobe & 0x4000u) != 0u);
+}
+
+fn photon_lobe_light(lobe: u32) -> u32 {
+    return ((lobe >> 6u) & 0xffu) << 8u;
+}
+
+fn photon_lobe(state: u32, light_and_surface: u32) -> u32 {
+    return ((state >> PHOTON_LOBE_SHIFT) & 63u) | (((light_and_surface >> 8u) & 0xffu) << 6u);
 }
 
 fn photon_surface(light_and_surface: u32) -> u32 {
@@ -49,14 +68,27 @@ fn photon_boost(state: u32) -> f32 {
     return select(exp2(steps / PHOTON_BOOST_STEPS), 1.0, (state >> 24u) == 0u);
 }
 
+// The footprint of a photon, both numbers as the upper halves of their bits: within 0.4 %. Its own number is finite, for its
+// upper half is that of the radius.
+fn photon_footprint(radius: f32, growth: f32) -> f32 {
+    let halves = bitcast<vec2u>(clamp(vec2f(radius, growth), vec2f(0x1p-20), vec2f(0x1p20))) + vec2u(0x8000u);
+    return bitcast<f32>((halves.x & 0xffff0000u) | (halves.y >> 16u));
+}
+
+// Radius, growth.
+fn photon_footprint_of(density: f32) -> vec2f {
+    let bits = bitcast<u32>(density);
+    return vec2f(bitcast<f32>(bits & 0xffff0000u), bitcast<f32>(bits << 16u));
+}
+
 // A hop that met no surface.
 fn photon_gone(state: u32, flux: vec3f, direction: vec3f, light: u32) -> Photon {
     return Photon(vec3f(0.0), state, flux, 0.0, 0u, octahedral_pack(direction), 0u, light);
 }
 
-// Whether it counts in density estimation: it arrived at a surface, and not straight from its light.
+// Whether it counts in density estimation: it arrived at a diffuse surface, and not straight from its light.
 fn photon_is_splatted(state: u32) -> bool {
-    return (state & (PHOTON_STATE_MASK | PHOTON_FIRST_HIT)) == PHOTON_STORED;
+    return (state & (PHOTON_STATE_MASK | PHOTON_FIRST_HIT | PHOTON_LOBE_KIND)) == PHOTON_STORED;
 }
 
 // Whether a surer tracer should walk the hop again.

@@ -24,5 +24,5 @@ fn receiver_at(pixel: vec2u) -> Receiver {
     );
     let shading = g_buffer_normal(view, textureLoad(normal_texture, at, 0));
     let normal = g_buffer_geometric_normal(view, p, position, around, shading);
-    return Receiver(position, normal, textureLoad(surface_texture, at, 0).r, true);
+    return Receiver(position, normal, textureLoad(surface_texture, at, 0).r & 0xffffu, true);
 }

@@ -17,5 +17,6 @@ struct SurfaceHit {
     fetches: u32,
     maps: u32,
     steps: u32,
-    pad: u32,
+    // As in Hit
+    lobe: u32,
 }

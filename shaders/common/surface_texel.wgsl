@@ -2,7 +2,8 @@
 //   x  distance along the texel's ray, unit frame, f32 bits; 0: nothing is there
 //   y  geometric normal on the side that is seen, octahedral
 //   z  reflectance, 11-11-10
-//   w  bits 0-7 material class, bit 8 the back of a triangle is seen, bits 16-31 the surface, 0: none in particular
+//   w  bits 0-7 and 9-14 how it scatters (lobe.wgsl), bit 8 the back of a triangle is seen, bits 16-31 the surface, 0: none in
+//      particular
 // The capture functions are what a host calls from its own fragment shader.
 
 const SURFACE_TEXEL_BACK_FACE: u32 = 256u;
@@ -33,6 +34,16 @@ fn surface_texel_on(texel: SurfaceTexel, surface: u32) -> SurfaceTexel {
     return SurfaceTexel(
         texel.distance, texel.normal, texel.reflectance, (texel.flags & 0xffffu) | (surface << SURFACE_TEXEL_SURFACE_SHIFT),
     );
+}
+
+// The texel of a surface that scatters this way: `lobe_metal` or `lobe_glass`; else it is diffuse.
+fn surface_texel_scattering(texel: SurfaceTexel, lobe: u32) -> SurfaceTexel {
+    let bits = (lobe & 0xffu) | ((lobe & 0x3f00u) << 1u);
+    return SurfaceTexel(texel.distance, texel.normal, texel.reflectance, (texel.flags & 0xffff0100u) | bits);
+}
+
+fn surface_texel_lobe(texel: SurfaceTexel) -> u32 {
+    return (texel.flags & 0xffu) | ((texel.flags >> 1u) & 0x3f00u);
 }
 
 fn surface_texel_surface(texel: SurfaceTexel) -> u32 {

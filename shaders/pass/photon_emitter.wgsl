@@ -143,14 +143,22 @@ fn emit_photon(index: u32, start: EmissionStart, kept: u32) {
     let distance = light_texel_distance(ray, light_texel_ray(light, ray, at, params.shadow_map_size), texel);
     let cosine = abs(dot(texel.normal, ray.direction));
     let spread = select(1.0 / (distance * distance), 1.0, light.kind == LIGHT_DIRECTIONAL);
+    let back = select(0u, HIT_BACK, (texel.flags & SURFACE_TEXEL_BACK_FACE) != 0u);
+    let lobe = surface_texel_lobe(texel) | back;
+    var density = start.boost * emission.pdf * cosine * spread;
+    if lobe_is_specular(lobe) {
+        let radius = inverseSqrt(max(start.boost * emission.pdf * spread, 1e-20));
+        let growth = select(radius / distance, 0.0, light.kind == LIGHT_DIRECTIONAL);
+        density = photon_footprint(radius, growth);
+    }
     photons[index] = Photon(
         ray.origin + distance * ray.direction,
-        PHOTON_STORED | PHOTON_FIRST_HIT | kept,
+        PHOTON_STORED | PHOTON_FIRST_HIT | kept | photon_lobe_state(lobe),
         flux,
-        start.boost * emission.pdf * cosine * spread,
+        density,
         octahedral_pack(texel.normal),
         octahedral_pack(ray.direction),
         reflectance_pack(texel.reflectance),
-        light_index | (surface_texel_surface(texel) << 16u),
+        light_index | photon_lobe_light(lobe) | (surface_texel_surface(texel) << 16u),
     );
 }

@@ -17,6 +17,10 @@ struct Material {
     base_color: vec3f,
     alpha_cutoff: f32,
     emission: vec3f,
+    metallic: f32,
+    roughness: f32,
+    transmission: f32,
+    index_of_refraction: f32,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
@@ -24,7 +28,8 @@ struct Material {
 @group(0) @binding(2) var<storage, read> materials: array<Material>;
 @group(1) @binding(0) var base_color_texture: texture_2d<f32>;
 @group(1) @binding(1) var emission_texture: texture_2d<f32>;
-@group(1) @binding(2) var material_sampler: sampler;
+@group(1) @binding(2) var metallic_roughness_texture: texture_2d<f32>;
+@group(1) @binding(3) var material_sampler: sampler;
 
 struct Vertex {
     @builtin(position) clip: vec4f,
@@ -52,6 +57,7 @@ struct Surface {
     emission: vec3f,
     alpha_cutoff: f32,
     front_facing: bool,
+    lobe: u32,
 }
 
 // Everything that needs derivatives, before any discard.
@@ -60,9 +66,21 @@ fn surface_at(v: Vertex, front_facing: bool) -> Surface {
     let material = materials[instance.material];
     let texel = textureSample(base_color_texture, material_sampler, v.tex_coord);
     let emission = textureSample(emission_texture, material_sampler, v.tex_coord).rgb * material.emission;
+    let rough_metallic = textureSample(metallic_roughness_texture, material_sampler, v.tex_coord).gb;
+    let lobe = lobe_of(
+        material.metallic * rough_metallic.y,
+        material.roughness * rough_metallic.x,
+        material.transmission,
+        material.index_of_refraction,
+    );
     let front = front_facing != (instance.mirrored == 1u);
     return Surface(
-        surface_capture_normal(v.position), vec4f(material.base_color, 1.0) * texel, emission, material.alpha_cutoff, front,
+        surface_capture_normal(v.position),
+        vec4f(material.base_color, 1.0) * texel,
+        emission,
+        material.alpha_cutoff,
+        front,
+        lobe,
     );
 }
 
@@ -75,7 +93,8 @@ fn fragment_surface(v: Vertex, @builtin(front_facing) front_facing: bool) -> @lo
     let texel = surface_texel_at(
         v.position, surface.geometric_normal, surface.base_color.rgb, view.eye, surface.front_facing,
     );
-    return surface_texel_pack(surface_texel_on(texel, instances[v.instance].surface));
+    let scattering = surface_texel_scattering(texel, surface.lobe);
+    return surface_texel_pack(surface_texel_on(scattering, instances[v.instance].surface));
 }
 
 struct GBufferTexel {
@@ -103,6 +122,6 @@ fn fragment_g_buffer(v: Vertex, @builtin(front_facing) front_facing: bool) -> GB
         octahedral_encode(shading),
         vec4f(surface.base_color.rgb, 1.0),
         vec4f(emission, 1.0),
-        instances[v.instance].surface,
+        instances[v.instance].surface | (surface.lobe << 16u),
     );
 }

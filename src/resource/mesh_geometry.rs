@@ -37,6 +37,10 @@ pub(crate) mod gpu {
         pub(crate) base_color: [f32; 3],
         pub(crate) alpha_cutoff: f32,
         pub(crate) emission: [f32; 3],
+        pub(crate) metallic: f32,
+        pub(crate) roughness: f32,
+        pub(crate) transmission: f32,
+        pub(crate) index_of_refraction: f32,
         pub(crate) _pad: u32,
     }
 
@@ -58,7 +62,12 @@ pub(crate) const SCENE_SLOTS: [Slot; 3] = [
 ];
 
 /// Bindings of group 1, in order.
-pub(crate) const MATERIAL_SLOTS: [Slot; 3] = [Slot::FilteredTexture, Slot::FilteredTexture, Slot::Sampler];
+pub(crate) const MATERIAL_SLOTS: [Slot; 4] = [
+    Slot::FilteredTexture,
+    Slot::FilteredTexture,
+    Slot::FilteredTexture,
+    Slot::Sampler,
+];
 
 /// Where the vertex stage finds the members of a vertex.
 pub(crate) const VERTEX_ATTRIBUTES: [wgpu::VertexAttribute; 3] =
@@ -347,6 +356,10 @@ fn material_record(context: &PrepareContext<'_>, material: &Material) -> gpu::Me
         base_color: material.base_color,
         alpha_cutoff: material.alpha_cutoff.unwrap_or(0.0),
         emission: context.frame.radiance(emission).to_array(),
+        metallic: material.metallic,
+        roughness: material.roughness,
+        transmission: material.transmission,
+        index_of_refraction: material.index_of_refraction,
         _pad: 0,
     }
 }
@@ -452,6 +465,7 @@ fn material_groups(
             let resources = vec![
                 view(m.base_color_texture),
                 view(m.emission_texture),
+                view(m.metallic_roughness_texture),
                 wgpu::BindingResource::Sampler(&sampler),
             ];
             device::bind_group(device, "lightfall::MeshGeometry::material", layout, resources)

@@ -30,7 +30,7 @@ pub struct Photon {
     pub direction: u32,
     /// Reflectance of the surface, 11-11-10.
     pub reflectance: u32,
-    /// Bits 0 to 15: index of the light that the path began at, among the punctual ones. Bits 16 to 31:
+    /// Bits 0 to 15: index of the light that the path began at, environments not counted, or behind them of the lamp. Bits 16 to 31:
     /// [`Instance::surface`](crate::scene::Instance::surface) of what was hit, 0 where it has none.
     pub light_and_surface: u32,
 }
@@ -96,7 +96,7 @@ impl Photon {
         steps(rgb[0], 2047.0) | steps(rgb[1], 2047.0) << 11 | steps(rgb[2], 1023.0) << 22
     }
 
-    /// Index of the light that the path began at, among the punctual ones.
+    /// Index of the light that the path began at, environments not counted, or behind them of the lamp.
     pub fn light(&self) -> u32 {
         self.light_and_surface & 0xffff
     }

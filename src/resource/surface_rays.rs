@@ -62,8 +62,8 @@ pub struct SurfaceHit {
     pub maps: u32,
     /// Steps of the innermost loops.
     pub steps: u32,
-    /// 0.
-    pub pad: u32,
+    /// How the surface scatters, as surface texels have it; bit 14: its back is hit.
+    pub lobe: u32,
 }
 
 impl SurfaceHit {

@@ -7,7 +7,7 @@ use crate::{Error, gpu};
 pub(crate) const VISIBILITY_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
 
 /// Share of each light that is seen: 1 all of its extent, 0 none of it. A 2D array of `r32float`, one layer a light in the
-/// order of the punctual lights, and a spare last layer: wgpu's GL backend takes an array of one layer for a plain texture
+/// order of the lights, environments left out, and a spare last layer: wgpu's GL backend takes an array of one layer for a plain texture
 /// and one of 6 k layers for a cube map. Where no surface is seen, or it faces away from the light, it is 0. Filled by
 /// [`SoftShadow`](crate::pass::SoftShadow), or by a host that finds out by other means.
 #[derive(Debug)]

@@ -8,7 +8,12 @@ fn trace_ray(position: vec3f, normal: vec3f, direction: vec3f) -> Hit {
     }
     let surface = bvh_surface(met);
     let is_back = dot(surface.geometric_normal, direction) > 0.0;
-    let side = select(surface.geometric_normal, -surface.geometric_normal, is_back);
     let number = bvh_instances[met.instance].mask >> BVH_SURFACE_SHIFT;
-    return Hit(HIT_SURFACE, met.distance, surface.position, side, bvh_base_color(surface), number);
+    var lobe = bvh_lobe(surface);
+    // What reflects and refracts is as smooth as it is shaded, wherever the ray comes from that side.
+    let is_shaded = lobe_is_specular(lobe) && (dot(surface.shading_normal, direction) > 0.0) == is_back;
+    let front = select(surface.geometric_normal, surface.shading_normal, is_shaded);
+    lobe |= select(0u, HIT_BACK, is_back);
+    let side = select(front, -front, is_back);
+    return Hit(HIT_SURFACE, met.distance, surface.position, side, bvh_base_color(surface), number, lobe);
 }

@@ -21,5 +21,5 @@ fn trace_surface_rays(@builtin(global_invocation_id) id: vec3u) {
     if hit.kind == HIT_SURFACE {
         normal = octahedral_pack(hit.normal);
     }
-    hits[index] = SurfaceHit(hit.distance, hit.kind, normal, reflectance_pack(hit.reflectance), 0u, 0u, 0u, 0u);
+    hits[index] = SurfaceHit(hit.distance, hit.kind, normal, reflectance_pack(hit.reflectance), 0u, 0u, 0u, hit.lobe);
 }

@@ -37,7 +37,7 @@ fn false_position_accept_angle(texel: EnvMapTexel, x: vec3f, r: vec3f) -> Hit {
     if error > params.epsilon || distance < 4.0 * TRACE_NEAREST {
         return hit_nothing(HIT_LOST);
     }
-    return Hit(HIT_SURFACE, distance, stored, texel.surface.normal, texel.surface.reflectance, surface_texel_surface(texel.surface));
+    return trace_hit(texel.surface, distance, stored);
 }
 
 // What one map says of the ray.

@@ -254,7 +254,7 @@ fn hierarchy_map(map: u32, x: vec3f, r: vec3f, start: f32, end: f32, starts_in_f
 }
 
 fn hierarchy_hit(surface: SurfaceTexel, x: vec3f, r: vec3f, t: f32) -> Hit {
-    return Hit(HIT_SURFACE, t, x + t * r, surface.normal, surface.reflectance, surface_texel_surface(surface));
+    return trace_hit(surface, t, x + t * r);
 }
 
 // The ray comes out through a surface from behind, or close behind its rim: through whatever body that surface belongs to.
@@ -263,6 +263,9 @@ fn hierarchy_blocked(found: MapTrace, surface: SurfaceTexel, x: vec3f, r: vec3f,
     var result = found;
     result.hit = hierarchy_hit(surface, x, r, t);
     result.hit.kind = HIT_TENTATIVE;
-    result.hit.normal = select(surface.normal, -surface.normal, dot(surface.normal, r) > 0.0);
+    if dot(surface.normal, r) > 0.0 {
+        result.hit.normal = -surface.normal;
+        result.hit.lobe ^= HIT_BACK;
+    }
     return result;
 }

@@ -70,6 +70,13 @@ fn trace_chord(under: vec2f, over: vec2f) -> f32 {
     return under.x + (over.x - under.x) * clamp(b, 0.0, 1.0);
 }
 
+// The surface that a texel shows, hit at p from the side that is seen.
+fn trace_hit(surface: SurfaceTexel, distance: f32, p: vec3f) -> Hit {
+    let back = select(0u, HIT_BACK, (surface.flags & SURFACE_TEXEL_BACK_FACE) != 0u);
+    let lobe = surface_texel_lobe(surface) | back;
+    return Hit(HIT_SURFACE, distance, p, surface.normal, surface.reflectance, surface_texel_surface(surface), lobe);
+}
+
 // Ray against the plane of the texel's surface: it must be met from the front, and near where the texel lies.
 fn trace_accept_plane(texel: EnvMapTexel, x: vec3f, r: vec3f) -> Hit {
     let n = texel.surface.normal;
@@ -89,7 +96,7 @@ fn trace_accept_plane(texel: EnvMapTexel, x: vec3f, r: vec3f) -> Hit {
     if max(away.x, away.y) > TRACE_FOOTPRINT {
         return hit_nothing(HIT_LOST);
     }
-    return Hit(HIT_SURFACE, distance, p, n, texel.surface.reflectance, surface_texel_surface(texel.surface));
+    return trace_hit(texel.surface, distance, p);
 }
 
 // Whether a map sees a surface point from its front: then the ray starts in space that the map knows.

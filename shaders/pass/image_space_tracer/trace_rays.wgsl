@@ -22,6 +22,6 @@ fn trace_rays(@builtin(global_invocation_id) id: vec3u) {
         normal = octahedral_pack(hit.normal);
     }
     hits[index] = SurfaceHit(
-        hit.distance, hit.kind, normal, reflectance_pack(hit.reflectance), env_map_fetches, trace_maps, trace_steps, 0u,
+        hit.distance, hit.kind, normal, reflectance_pack(hit.reflectance), env_map_fetches, trace_maps, trace_steps, hit.lobe,
     );
 }

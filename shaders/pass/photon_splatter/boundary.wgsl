@@ -7,7 +7,7 @@ const BOUNDARY_DIMENSION: u32 = 4096u;
 // Number of the surface at a texel of the G-buffer.
 fn boundary_surface(at: vec2u) -> u32 {
     if splat_keeps_to_surfaces {
-        return textureLoad(surface_texture, at, 0).r;
+        return textureLoad(surface_texture, at, 0).r & 0xffffu;
     }
     return 0u;
 }

@@ -6,28 +6,42 @@
 
 // Random dimensions of Russian roulette start here, above those of directions.
 const WALK_ROULETTE_DIMENSION: u32 = 1024u;
+// And those of whether glass reflects or transmits.
+const WALK_FRESNEL_DIMENSION: u32 = 2048u;
 const WALK_INVERSE_PI: f32 = 0.318309886;
 // A hop counts as no shorter than this, unit frame, so that its density is finite.
 const WALK_SHORTEST: f32 = 0x1p-20;
 
 // What survives a scattering: flux times reflectance, or zero. From `roulette_from` on a path survives with the
 // probability of its largest factor, and is then worth that much more.
-fn scatter_flux(photon: Photon, bounce: u32, sequence_index: u32) -> vec3f {
-    let reflectance = reflectance_unpack(photon.reflectance);
+fn scatter_flux(photon: Photon, reflectance: vec3f, bounce: u32, sequence_index: u32) -> vec3f {
     let scattered = photon.flux * reflectance;
     if bounce < walk.roulette_from {
         return scattered;
     }
-    let survival = max(reflectance.x, max(reflectance.y, reflectance.z));
+    let survival = min(max(reflectance.x, max(reflectance.y, reflectance.z)), 1.0);
     if random_unit(sequence_index, WALK_ROULETTE_DIMENSION + bounce) >= survival {
         return vec3f(0.0);
     }
     return scattered / survival;
 }
 
-// What a hop arrives as that left `origin` in this direction, which is drawn with `density` per solid angle.
-fn arrived(origin: Photon, flux: vec3f, direction: vec3f, density: f32, hit: Hit) -> Photon {
-    let light = photon_light(origin.light_and_surface);
+// How densely photons arrive that leave in a direction.
+struct Spread {
+    // Per solid angle, from a point; 0: from a footprint
+    density: f32,
+    // Radius of the footprint at the start, and what it grows by in a unit of length
+    radius: f32,
+    growth: f32,
+}
+
+fn spread_from_point(density: f32) -> Spread {
+    return Spread(density, 0.0, inverseSqrt(max(density, 1e-20)));
+}
+
+// What a hop arrives as that left `origin` in this direction.
+fn arrived(origin: Photon, flux: vec3f, direction: vec3f, spread: Spread, hit: Hit) -> Photon {
+    let light = photon_light(origin.light_and_surface) | photon_lobe_light(hit.lobe);
     let kept = origin.state & PHOTON_EMISSION;
     if hit.kind != HIT_SURFACE && hit.kind != HIT_TENTATIVE {
         let fate = select(PHOTON_LOST, PHOTON_ESCAPED, hit.kind == HIT_ESCAPED);
@@ -37,14 +51,53 @@ fn arrived(origin: Photon, flux: vec3f, direction: vec3f, density: f32, hit: Hit
     let distance = max(hit.distance, WALK_SHORTEST);
     return Photon(
         hit.position,
-        select(PHOTON_STORED, PHOTON_STORED | PHOTON_TENTATIVE, hit.kind == HIT_TENTATIVE) | kept,
+        select(PHOTON_STORED, PHOTON_STORED | PHOTON_TENTATIVE, hit.kind == HIT_TENTATIVE) | kept | photon_lobe_state(hit.lobe),
         flux,
-        density * cosine / (distance * distance),
+        arrived_density(spread, cosine, distance, hit.lobe),
         octahedral_pack(hit.normal),
         octahedral_pack(direction),
         reflectance_pack(hit.reflectance),
         light | (hit.surface << 16u),
     );
+}
+
+fn arrived_density(spread: Spread, cosine: f32, distance: f32, lobe: u32) -> f32 {
+    let radius = spread.radius + spread.growth * distance;
+    if lobe_is_specular(lobe) {
+        return photon_footprint(radius, spread.growth);
+    }
+    if spread.density > 0.0 {
+        return spread.density * cosine / (distance * distance);
+    }
+    return cosine / (radius * radius);
+}
+
+// How a photon leaves a specular surface: the direction, with density per solid angle (0: the only one), and the share of flux.
+fn scatter_specular(photon: Photon, lobe: u32, bounce: u32, sequence_index: u32) -> Scattering {
+    let is_front = (photon.state & PHOTON_BACK) == 0u;
+    let color = reflectance_unpack(photon.reflectance);
+    let scatterer = scatter_by_lobe(lobe, octahedral_unpack(photon.normal), is_front, color);
+    let u = random_pair(sequence_index, 2u * bounce);
+    let chance = random_unit(sequence_index, WALK_FRESNEL_DIMENSION + bounce);
+    var scattering = scatter_sample(scatterer, -octahedral_unpack(photon.direction), vec4f(u, chance, 0.0));
+    // Flux is not squeezed as radiance is.
+    scattering.weight *= scattering.squeeze;
+    return scattering;
+}
+
+// One hop from a photon on a specular surface. Its footprint grows on as behind a flat mirror, and at least as the lobe
+// spreads.
+fn next_specular(photon: Photon, flux: vec3f, scattering: Scattering) -> Photon {
+    let direction = scattering.direction;
+    let normal = octahedral_unpack(photon.normal);
+    let side = select(-normal, normal, dot(normal, direction) > 0.0);
+    let footprint = photon_footprint_of(photon.density);
+    var growth = footprint.y;
+    if scattering.pdf > 0.0 {
+        growth = max(growth, inverseSqrt(scattering.pdf));
+    }
+    let hit = trace_ray(photon.position, side, direction);
+    return arrived(photon, flux, direction, Spread(0.0, footprint.x, growth), hit);
 }
 
 // One hop from a stored photon.
@@ -53,7 +106,7 @@ fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) ->
     let local = sampling_cosine(random_pair(sequence_index, 2u * bounce));
     let direction = normalize(sampling_frame(normal) * local);
     let hit = trace_ray(photon.position, normal, direction);
-    return arrived(photon, flux, direction, WALK_INVERSE_PI * local.z, hit);
+    return arrived(photon, flux, direction, spread_from_point(WALK_INVERSE_PI * local.z), hit);
 }
 
 // The first hop of a photon that stands on the surface of a light.
@@ -68,7 +121,7 @@ fn first_photon(start: Photon) -> Photon {
         return lost;
     }
     let density = start.density * WALK_INVERSE_PI * max(0.0, dot(normal, direction));
-    var photon = arrived(start, start.flux, direction, density, hit);
+    var photon = arrived(start, start.flux, direction, spread_from_point(density), hit);
     photon.state |= PHOTON_FIRST_HIT;
     return photon;
 }
@@ -84,16 +137,28 @@ fn walk_path(index: u32) {
     }
     for (var bounce = scattered_from; bounce <= walk.last_hop; bounce++) {
         let slot = bounce * walk.photon_count + index;
+        let lobe = photon_lobe(photon.state, photon.light_and_surface);
+        let is_specular = lobe_is_specular(lobe);
         var flux = vec3f(0.0);
+        var scattering: Scattering;
         if (photon.state & PHOTON_STATE_MASK) == PHOTON_STORED {
-            flux = scatter_flux(photon, bounce, sequence_index);
+            var share = reflectance_unpack(photon.reflectance);
+            if is_specular {
+                scattering = scatter_specular(photon, lobe, bounce, sequence_index);
+                share = scattering.weight;
+            }
+            flux = scatter_flux(photon, share, bounce, sequence_index);
         }
         if all(flux == vec3f(0.0)) {
             photon.state = PHOTON_EMPTY;
             photons[slot].state = PHOTON_EMPTY;
             continue;
         }
-        photon = next_photon(photon, flux, bounce, sequence_index);
+        if is_specular {
+            photon = next_specular(photon, flux, scattering);
+        } else {
+            photon = next_photon(photon, flux, bounce, sequence_index);
+        }
         photons[slot] = photon;
     }
 }

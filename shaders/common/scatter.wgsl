@@ -41,17 +41,13 @@ struct Scattering {
     squeeze: f32,
 }
 
-fn scatter_at(surface: BvhSurface, direction: vec3f) -> Scatterer {
-    let m = surface.material;
-    let rough_metallic = bvh_texture(bvh_materials[m].metallic_roughness_texture, surface.tex_coord).gb;
-    let roughness = bvh_materials[m].roughness * rough_metallic.x;
-    let metallic = bvh_materials[m].metallic * rough_metallic.y;
-    let is_front = dot(surface.shading_normal, direction) < 0.0;
-    let normal = select(-surface.shading_normal, surface.shading_normal, is_front);
+// Of a material by the conventions of glTF 2.0. `normal` is on the side that the ray came from.
+fn scatter_by(
+    normal: vec3f, is_front: bool, color: vec3f, metallic: f32, roughness: f32, transmission: f32, index: f32,
+) -> Scatterer {
     let is_smooth = roughness < SCATTER_SMOOTH;
     var kind = SCATTER_DIFFUSE;
-    let index = bvh_materials[m].index_of_refraction;
-    if bvh_materials[m].transmission > SCATTER_IS_TRANSMISSIVE {
+    if transmission > SCATTER_IS_TRANSMISSIVE {
         // Facets that do not bend light leave it a single direction.
         let is_single = is_smooth || index - 1.0 < SCATTER_LEAST_BENDING;
         kind = select(SCATTER_ROUGH_GLASS, SCATTER_GLASS, is_single);
@@ -59,9 +55,16 @@ fn scatter_at(surface: BvhSurface, direction: vec3f) -> Scatterer {
         kind = select(SCATTER_METAL, SCATTER_MIRROR, is_smooth);
     }
     let alpha = max(roughness * roughness, SCATTER_LEAST_ALPHA);
-    return Scatterer(
-        kind, sampling_frame(normal), bvh_base_color(surface), alpha, select(1.0 / index, index, is_front),
-    );
+    return Scatterer(kind, sampling_frame(normal), color, alpha, select(1.0 / index, index, is_front));
+}
+
+// As a lobe says.
+fn scatter_by_lobe(lobe: u32, normal: vec3f, is_front: bool, color: vec3f) -> Scatterer {
+    let kind = lobe_kind(lobe);
+    let metallic = select(0.0, 1.0, kind == LOBE_METAL);
+    let transmission = select(0.0, 1.0, kind == LOBE_GLASS);
+    let index = select(1.0, lobe_index_of_refraction(lobe), kind == LOBE_GLASS);
+    return scatter_by(normal, is_front, color, metallic, lobe_roughness(lobe), transmission, index);
 }
 
 // Whether it scatters into single directions only, which no light can be sampled for.

@@ -1,0 +1,48 @@
+// How a surface scatters light, in 14 bits beside its colour: what surface texels, G-buffers and photons keep of a material.
+//   bits 0-1  LOBE_DIFFUSE, LOBE_METAL or LOBE_GLASS
+//   metal     bits 2-13 perceptual roughness, in 4095ths
+//   glass     bits 2-6 perceptual roughness, in 31sts; bits 7-13 index of refraction - 1, in 64ths
+// A diffuse surface is 0.
+
+const LOBE_DIFFUSE: u32 = 0u;
+const LOBE_METAL: u32 = 1u;
+const LOBE_GLASS: u32 = 2u;
+const LOBE_KIND: u32 = 3u;
+const LOBE_BITS: u32 = 0x3fffu;
+
+fn lobe_metal(roughness: f32) -> u32 {
+    return LOBE_METAL | (u32(round(saturate(roughness) * 4095.0)) << 2u);
+}
+
+// Index of refraction from 1 to 2.98.
+fn lobe_glass(roughness: f32, index_of_refraction: f32) -> u32 {
+    let index = u32(round(clamp((index_of_refraction - 1.0) * 64.0, 0.0, 127.0)));
+    return LOBE_GLASS | (u32(round(saturate(roughness) * 31.0)) << 2u) | (index << 7u);
+}
+
+// Of a material by the conventions of glTF 2.0.
+fn lobe_of(metallic: f32, roughness: f32, transmission: f32, index_of_refraction: f32) -> u32 {
+    if transmission > 0.5 {
+        return lobe_glass(roughness, index_of_refraction);
+    }
+    return select(LOBE_DIFFUSE, lobe_metal(roughness), metallic > 0.5);
+}
+
+fn lobe_kind(lobe: u32) -> u32 {
+    return lobe & LOBE_KIND;
+}
+
+fn lobe_is_specular(lobe: u32) -> bool {
+    return (lobe & LOBE_KIND) != LOBE_DIFFUSE;
+}
+
+fn lobe_roughness(lobe: u32) -> f32 {
+    if lobe_kind(lobe) == LOBE_METAL {
+        return f32((lobe >> 2u) & 4095u) / 4095.0;
+    }
+    return f32((lobe >> 2u) & 31u) / 31.0;
+}
+
+fn lobe_index_of_refraction(lobe: u32) -> f32 {
+    return 1.0 + f32((lobe >> 7u) & 127u) / 64.0;
+}
