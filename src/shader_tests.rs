@@ -6,7 +6,8 @@ use crate::pass::photon_splatter::{raster, tiled};
 use crate::pass::{
     accumulator, composite, depth_hierarchy_build, direct_light, emission_importance, env_map_lighting,
     env_map_selector, final_gather, image_space_tracer, irradiance_filter, nearest_occluder, photon_emitter,
-    photon_splatter, photon_walk, soft_shadow, stable_sort, tone_map, trace_statistics, upsampler,
+    photon_grid, photon_splatter, photon_walk, soft_shadow, specular_paths, stable_sort, tone_map, trace_statistics,
+    upsampler,
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
@@ -292,8 +293,17 @@ fn twins() -> Vec<Twin> {
             position, inverse_radius_squared, strength, normal,
         }),
         twin!(wgsl::ENV_MAP_LIGHTING, "Params", env_map_lighting::gpu::Params {
-            bandwidth, first_slot, slot_count, row, cells, map_size, size, light_count, shadow_map_size, is_corrected,
-            sample_offset,
+            map_size, size, light_count, shadow_map_size, is_corrected, sample_offset,
+        }),
+        twin!(wgsl::SPECULAR_PATHS_BEGIN, "Params", specular_paths::gpu::Params {
+            width, first_row, row_count, step, steps, sample_offset, light_count, shadow_map_size, direct_weight,
+            indirect_weight,
+        }),
+        twin!(wgsl::SPECULAR_PATHS_BEGIN, "SpecularPath", specular_paths::gpu::SpecularPath {
+            throughput, goes_on, radiance, _pad,
+        }),
+        twin!(wgsl::PHOTON_GRID, "GridParams", photon_grid::gpu::GridParams {
+            bandwidth, first_slot, slot_count, row, cells,
         }),
         twin!(wgsl::FINAL_GATHER_SUM, "Params", final_gather::gpu::Params {
             factor, ray_count, first_row, row_count, sample_offset, map_count, map_size,
@@ -326,7 +336,7 @@ fn twins() -> Vec<Twin> {
             light, shadow_map_size, layer_count, search, search_taps, blur_taps, max_radius, range_scale,
         }),
         twin!(wgsl::COMPOSITE, "Params", composite::gpu::Params {
-            output_scale, direct_weight, indirect_weight, emission_weight,
+            output_scale, direct_weight, indirect_weight, emission_weight, specular_weight,
         }),
         twin!(wgsl::ACCUMULATOR, "Params", accumulator::gpu::Params { history_weight, mean_weight }),
         twin!(wgsl::TONE_MAP, "Params", tone_map::gpu::Params { exposure, curve, inverse_gamma }),
@@ -459,8 +469,10 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "PhotonSplatter bins" => vec![&raster::BIN_SLOTS],
         "PhotonSplatter quads" | "PhotonSplatter volumes" => vec![&raster::RASTER_SLOTS],
         "PhotonSplatter finish" => vec![&photon_splatter::FINISH_SLOTS],
-        "EnvMapLighting sort" => vec![&env_map_lighting::SORT_SLOTS],
-        "EnvMapLighting" => vec![&env_map_lighting::LIGHT_SLOTS],
+        "PhotonGrid" => vec![&photon_grid::SLOTS],
+        "SpecularPaths begin" => vec![&specular_paths::BEGIN_SLOTS],
+        "SpecularPaths" => vec![&specular_paths::ADVANCE_SLOTS],
+        "EnvMapLighting" => vec![&env_map_lighting::SLOTS],
         "FinalGather spread" => vec![&final_gather::SPREAD_SLOTS],
         "FinalGather sum" => vec![&final_gather::SUM_SLOTS],
         "IrradianceFilter" => vec![&irradiance_filter::SLOTS],

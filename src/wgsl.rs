@@ -314,9 +314,9 @@ pub(crate) const PHOTON_SPLATTER_FINISH: &str = compose![
     "common/hash.wgsl",
 ];
 
-pub(crate) const ENV_MAP_LIGHTING_SORT: &str = compose![
-    "pass/env_map_lighting/sort_photons.wgsl",
-    "pass/env_map_lighting/params.wgsl",
+pub(crate) const PHOTON_GRID: &str = compose![
+    "pass/photon_grid/sort_photons.wgsl",
+    "common/photon_grid.wgsl",
     "common/bandwidth.wgsl",
     "common/first_of_key.wgsl",
     "common/splat_record.wgsl",
@@ -327,7 +327,8 @@ pub(crate) const ENV_MAP_LIGHTING_SORT: &str = compose![
 
 pub(crate) const ENV_MAP_LIGHTING: &str = compose![
     "pass/env_map_lighting/light_texels.wgsl",
-    "pass/env_map_lighting/params.wgsl",
+    "common/photon_grid.wgsl",
+    "common/grid_light.wgsl",
     "common/bandwidth.wgsl",
     "common/boundary.wgsl",
     "common/gather_one.wgsl",
@@ -462,8 +463,58 @@ pub(crate) const SOFT_SHADOW_BLUR: &str = compose![
     "common/sampling.wgsl",
 ];
 
+pub(crate) const SPECULAR_PATHS_BEGIN: &str = compose![
+    "pass/specular_paths/begin_paths.wgsl",
+    "pass/specular_paths/params.wgsl",
+    "common/surface_rays.wgsl",
+    "common/scatter.wgsl",
+    "common/ggx.wgsl",
+    "common/fresnel.wgsl",
+    "common/lobe.wgsl",
+    "common/hit.wgsl",
+    "common/receiver_at.wgsl",
+    "common/receiver.wgsl",
+    "common/g_buffer.wgsl",
+    "common/octahedral.wgsl",
+    "common/sampling.wgsl",
+    "common/hash.wgsl",
+];
+
+pub(crate) const SPECULAR_PATHS_ADVANCE: &str = compose![
+    "pass/specular_paths/advance_paths.wgsl",
+    "pass/specular_paths/params.wgsl",
+    "common/surface_rays.wgsl",
+    "common/scatter.wgsl",
+    "common/ggx.wgsl",
+    "common/fresnel.wgsl",
+    "common/lobe.wgsl",
+    "common/hit.wgsl",
+    "common/photon_grid.wgsl",
+    "common/grid_light.wgsl",
+    "common/bandwidth.wgsl",
+    "common/gather_one.wgsl",
+    "common/gather.wgsl",
+    "common/splat.wgsl",
+    "common/splat_record.wgsl",
+    "common/splat_surfaces.wgsl",
+    "common/receiver.wgsl",
+    "common/photon.wgsl",
+    "common/light_irradiance.wgsl",
+    "common/polygon.wgsl",
+    "common/is_lit.wgsl",
+    "common/shadow.wgsl",
+    "common/light.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+    "common/hash.wgsl",
+];
+
 pub(crate) const COMPOSITE: &str = compose![
     "pass/composite.wgsl",
+    "common/lobe.wgsl",
     "common/full_screen.wgsl",
     "common/g_buffer.wgsl",
     "common/octahedral.wgsl",
@@ -565,7 +616,9 @@ pub const MODULES: &[(&str, &str)] = &[
     ("PhotonSplatter quads", PHOTON_SPLATTER_QUADS),
     ("PhotonSplatter volumes", PHOTON_SPLATTER_VOLUMES),
     ("PhotonSplatter finish", PHOTON_SPLATTER_FINISH),
-    ("EnvMapLighting sort", ENV_MAP_LIGHTING_SORT),
+    ("PhotonGrid", PHOTON_GRID),
+    ("SpecularPaths begin", SPECULAR_PATHS_BEGIN),
+    ("SpecularPaths", SPECULAR_PATHS_ADVANCE),
     ("EnvMapLighting", ENV_MAP_LIGHTING),
     ("FinalGather spread", FINAL_GATHER_SPREAD),
     ("FinalGather sum", FINAL_GATHER_SUM),

@@ -428,6 +428,7 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
         g_buffer: &g_buffer,
         direct: &direct,
         indirect: &indirect,
+        specular: None,
         radiance: &radiance,
         settings: &CompositeSettings {
             output_scale: frame.output_scale(1.0).unwrap(),

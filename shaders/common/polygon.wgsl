@@ -79,3 +79,20 @@ fn polygon_irradiance(polygon: Polygon, p: vec3f, n: vec3f) -> f32 {
     sum += polygon_side(down, up, n);
     return max(0.0, -0.5 * sum);
 }
+
+// Distance at which a ray crosses the polygon's front; 1e38 if it does not.
+fn polygon_crossed(polygon: Polygon, origin: vec3f, direction: vec3f) -> f32 {
+    let across = cross(polygon.u, polygon.v);
+    let towards = dot(across, direction);
+    if towards >= 0.0 {
+        return 1e38;
+    }
+    let t = dot(across, polygon.corner - origin) / towards;
+    // Coordinates along the sides, which need not be perpendicular (Cramer).
+    let at = origin + t * direction - polygon.corner;
+    let scale = 1.0 / dot(across, across);
+    let a = dot(cross(at, polygon.v), across) * scale;
+    let b = dot(cross(polygon.u, at), across) * scale;
+    let limit = select(max(a, b), a + b, polygon.corners == 3u);
+    return select(1e38, t, t > 0.0 && min(a, b) >= 0.0 && limit <= 1.0);
+}

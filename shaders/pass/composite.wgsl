@@ -1,4 +1,5 @@
-// Outgoing radiance: emitted + reflectance / pi * (direct + indirect irradiance), scaled back to world units.
+// Outgoing radiance: emitted + reflectance / pi * (direct + indirect irradiance), or of a specular surface what is seen in it,
+// scaled back to world units.
 
 struct Params {
     // Radiance per unit-frame radiance, times pre-exposure
@@ -6,6 +7,8 @@ struct Params {
     direct_weight: f32,
     indirect_weight: f32,
     emission_weight: f32,
+    // 0: nothing is seen in specular surfaces
+    specular_weight: f32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -14,6 +17,8 @@ struct Params {
 @group(0) @binding(3) var emission_texture: texture_2d<f32>;
 @group(0) @binding(4) var direct_irradiance: texture_2d<f32>;
 @group(0) @binding(5) var indirect_irradiance: texture_2d<f32>;
+@group(0) @binding(6) var surface_texture: texture_2d<u32>;
+@group(0) @binding(7) var specular_radiance: texture_2d<f32>;
 
 const INVERSE_PI: f32 = 0.318309886;
 
@@ -28,5 +33,9 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let direct = textureLoad(direct_irradiance, at, 0).rgb * params.direct_weight;
     let indirect = textureLoad(indirect_irradiance, at, 0).rgb * params.indirect_weight;
     let emission = textureLoad(emission_texture, pixel, 0).rgb * params.emission_weight;
-    return vec4f((emission + base_color.rgb * INVERSE_PI * (direct + indirect)) * params.output_scale, 1.0);
+    var scattered = base_color.rgb * INVERSE_PI * (direct + indirect);
+    if lobe_is_specular(textureLoad(surface_texture, pixel, 0).r >> 16u) {
+        scattered = textureLoad(specular_radiance, at, 0).rgb * params.specular_weight;
+    }
+    return vec4f((emission + scattered) * params.output_scale, 1.0);
 }

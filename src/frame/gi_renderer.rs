@@ -11,6 +11,7 @@ use super::indirect_scene::{IndirectScene, PhotonInputs, PhotonPasses};
 use super::indirect_view::{IndirectView, IndirectViewInputs, ViewPasses};
 use super::recapture::Recapture;
 use super::selection_schedule::{PHOTON_ROUNDS, Work};
+use super::specular_view::SpecularView;
 use super::{IndirectMethod, Plan, Settings, Stage};
 use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, CoverageMeasure, DirectLight, DirectLightInputs,
@@ -108,6 +109,7 @@ pub struct ViewResources {
     direct: Option<(Irradiance, DirectLightResources)>,
     soft: Option<(Visibility, SoftShadowResources)>,
     indirect: Option<IndirectView>,
+    specular: Option<SpecularView>,
     size: [u32; 2],
     /// Of the renderer that `direct` and `indirect` were made for.
     generation: u64,
@@ -139,8 +141,8 @@ pub struct ViewInputs<'a> {
     pub queue: &'a wgpu::Queue,
     /// The geometry that was prepared.
     pub geometry: &'a dyn Geometry,
-    /// The same geometry as triangles, prepared for this frame: what rays of [`Stage::FinalGather`] meet where the settings
-    /// trace triangles.
+    /// The same geometry as triangles, prepared for this frame: what rays of [`Stage::FinalGather`] and
+    /// [`Stage::SpecularPaths`] meet where the settings trace triangles.
     #[cfg(feature = "bvh")]
     pub bvh: Option<&'a BvhGeometry>,
     /// One of the views that were prepared.
@@ -313,6 +315,9 @@ impl GiRenderer {
             self.photons_frame = None;
             self.recapture.forget();
             self.indirect = Some(IndirectScene::new(device, queue, settings)?);
+        }
+        if let Some(indirect) = &mut self.indirect {
+            indirect.sort_photons(device, plan.is_on(Stage::PhotonGrid))?;
         }
         Ok(())
     }
@@ -545,10 +550,15 @@ impl GiRenderer {
 
     #[cfg(feature = "bvh")]
     fn check_gathered_triangles(&self, inputs: &ViewInputs<'_>) -> Result<(), Error> {
-        let gathers = self.plan().is_some_and(|p| p.is_on(Stage::FinalGather));
-        if inputs.bvh.is_none() && gathers && self.settings.tracer_kind.uses_triangles() {
+        let is_on = |stage| self.plan().is_some_and(|p| p.is_on(stage));
+        let stage = match (is_on(Stage::FinalGather), is_on(Stage::SpecularPaths)) {
+            (true, _) => "FinalGather",
+            (false, true) => "SpecularPaths",
+            _ => return Ok(()),
+        };
+        if inputs.bvh.is_none() && self.settings.tracer_kind.uses_triangles() {
             return Err(Error::MissingInput {
-                stage: "FinalGather",
+                stage,
                 input: "ViewInputs::bvh",
                 remedy: "prepare a BvhGeometry each frame, or choose tracer.kind = image-space",
             });
@@ -618,6 +628,7 @@ impl GiRenderer {
             direct: None,
             soft: None,
             indirect: None,
+            specular: None,
             size,
             generation: self.generation,
         })
@@ -639,7 +650,7 @@ impl GiRenderer {
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] when a stage that the view needs for the first time does not fit; [`Error::MissingInput`] if
-    /// [`Stage::FinalGather`] is on, the settings trace triangles, and none are given. Nothing is recorded then.
+    /// [`Stage::FinalGather`] or [`Stage::SpecularPaths`] is on, the settings trace triangles, and none are given. Nothing is recorded then.
     pub fn record_view(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -701,6 +712,9 @@ impl GiRenderer {
                 counts_emission: self.emission.counts(),
             };
             own.record(encoder, &indirect_inputs)?;
+            if let Some(specular) = &mut resources.specular {
+                specular.record(encoder, &indirect_inputs, &direct.shadow_maps)?;
+            }
         }
         let composite_inputs = CompositeInputs {
             queue: inputs.queue,
@@ -710,6 +724,7 @@ impl GiRenderer {
                 .indirect
                 .as_ref()
                 .map_or(&self.black, IndirectView::irradiance),
+            specular: resources.specular.as_ref().map(SpecularView::radiance),
             radiance: &resources.radiance,
             settings: inputs.composite,
             timestamps: inputs.timestamps,
@@ -724,7 +739,7 @@ impl GiRenderer {
         let (device, size) = (&self.device, view.size);
         if view.generation != self.generation {
             // Another renderer's, or from before a resource was replaced: neither fits, and both would keep it alive.
-            (view.direct, view.soft, view.indirect) = (None, None, None);
+            (view.direct, view.soft, view.indirect, view.specular) = (None, None, None, None);
             view.generation = self.generation;
         }
         match &self.direct {
@@ -754,6 +769,12 @@ impl GiRenderer {
                 view.indirect = Some(IndirectView::new(device, &self.settings, &scene.photons, size)?);
             }
             Some(_) => {}
+        }
+        if !self.plan().is_some_and(|p| p.is_on(Stage::SpecularPaths)) {
+            view.specular = None;
+        } else if view.specular.is_none() {
+            // The last ray is one from a specular surface to a diffuse one.
+            view.specular = Some(SpecularView::new(device, self.settings.specular_surfaces, size)?);
         }
         Ok(())
     }
@@ -899,6 +920,9 @@ impl ViewResources {
         }
         if let Some(own) = &self.indirect {
             list.extend(own.memory_by_resource());
+        }
+        if let Some(own) = &self.specular {
+            list.push(("specular_paths", own.memory_use()));
         }
         list
     }

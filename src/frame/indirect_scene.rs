@@ -7,7 +7,7 @@ use crate::pass::{
     EmissionImportanceResources, EmissionUpdateInputs, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources,
     EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources, EnvMapLightingSettings, ImageSpaceTracer,
     ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources,
-    SharedHop,
+    PhotonGrid, PhotonGridInputs, PhotonGridResources, SharedHop,
 };
 #[cfg(feature = "bvh")]
 use crate::pass::{BvhTracer, BvhTracerInputs, BvhTracerResources};
@@ -30,6 +30,7 @@ pub(super) struct PhotonPasses {
     pub(super) bvh_tracer: Option<BvhTracer>,
     /// If light is gathered from there.
     env_map_lighting: Option<EnvMapLighting>,
+    photon_grid: PhotonGrid,
 }
 
 /// Allocated while there is indirect light.
@@ -44,6 +45,8 @@ pub(super) struct IndirectScene {
     bvh_tracer: Option<BvhTracerResources>,
     /// While one tracer traces what the other loses.
     lost: Option<LostRays>,
+    /// While anything specular may be seen.
+    grid: Option<PhotonGridResources>,
 }
 
 /// Allocated while rays are traced, or light is gathered, in image space.
@@ -92,6 +95,7 @@ impl PhotonPasses {
                 let config = &settings.splatter_config;
                 EnvMapLighting::new(device, config.kernel, config.keeps_to_surfaces)
             }),
+            photon_grid: PhotonGrid::new(device, settings.splatter_config.keeps_to_surfaces),
         }
     }
 }
@@ -143,6 +147,7 @@ impl IndirectScene {
                 .then(|| BvhTracerResources::for_shared_hops(device, shared_hops))
                 .transpose()?,
             lost: is_shared.then(|| LostRays::new(device, &photons)).transpose()?,
+            grid: None,
             photons,
         })
     }
@@ -151,6 +156,20 @@ impl IndirectScene {
     pub(super) fn renew_emitter(&mut self, device: &wgpu::Device) -> Result<(), Error> {
         self.emitter = PhotonEmitterResources::new(device)?;
         Ok(())
+    }
+
+    /// Keeps photons sorted, or not.
+    pub(super) fn sort_photons(&mut self, device: &wgpu::Device, is_wanted: bool) -> Result<(), Error> {
+        if !is_wanted {
+            self.grid = None;
+        } else if self.grid.is_none() {
+            self.grid = Some(PhotonGridResources::new(device, &self.photons)?);
+        }
+        Ok(())
+    }
+
+    pub(super) fn photon_grid(&self) -> Option<&PhotonGridResources> {
+        self.grid.as_ref()
     }
 
     pub(super) fn env_maps(&self) -> Option<&EnvMaps> {
@@ -237,6 +256,17 @@ impl IndirectScene {
             hops.try_for_each(|hop| self.record_walk(encoder, passes, inputs, Some(hop)))?;
         }
         self.record_lighting(encoder, passes, inputs);
+        if let Some(grid) = &mut self.grid {
+            let grid_inputs = PhotonGridInputs {
+                queue: scene.queue,
+                photons: &self.photons,
+                area: inputs.area,
+                radius: inputs.radius,
+                bandwidth: inputs.settings.splatter.bandwidth,
+                timestamps: scene.timestamps,
+            };
+            passes.photon_grid.record(encoder, grid, &grid_inputs);
+        }
         Ok(())
     }
 
@@ -334,6 +364,9 @@ impl IndirectScene {
         #[cfg(feature = "bvh")]
         if let Some(tracer) = &self.bvh_tracer {
             uniforms += tracer.memory_use();
+        }
+        if let Some(grid) = &self.grid {
+            list.push(("photon_grid", grid.memory_use()));
         }
         if let Some(lost) = &self.lost {
             list.push(("lost_rays", lost.memory_use()));

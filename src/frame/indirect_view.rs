@@ -9,13 +9,13 @@ use crate::pass::{
     EmissionImportanceInputs, EmissionImportanceResources, FinalGather, FinalGatherInputs, FinalGatherResources,
     ImageSpaceTracerRayInputs, ImageSpaceTracerResources, IrradianceFilter, IrradianceFilterInputs,
     IrradianceFilterResources, IrradianceFilterSettings, MarkedSplatInputs, PhotonSplatter, PhotonSplatterInputs,
-    PhotonSplatterResources, PhotonSplatterSettings, SplatShape, Upsampler, UpsamplerInputs, UpsamplerResources,
-    progressive_scale,
+    PhotonSplatterResources, PhotonSplatterSettings, SpecularPaths, SplatShape, Upsampler, UpsamplerInputs,
+    UpsamplerResources, progressive_scale,
 };
-use crate::resource::{EnvMaps, GBuffer, Irradiance, Lights, MarkedPixels, Photons, Subsampling, SurfaceRays};
+use crate::resource::{GBuffer, Irradiance, Lights, MarkedPixels, Photons, Subsampling, SurfaceRays};
 
 /// Most rays of a band, 64 bytes each with what they meet: two of its lists fit what every device grants.
-const MOST_RAYS: u64 = 1 << 21;
+pub(super) const MOST_RAYS: u64 = 1 << 21;
 
 /// From photons to the pixels of a view.
 #[derive(Debug)]
@@ -25,6 +25,7 @@ pub(super) struct ViewPasses {
     /// If they gather.
     final_gather: Option<(FinalGather, IrradianceFilter)>,
     upsampler: Upsampler,
+    pub(super) specular_paths: SpecularPaths,
 }
 
 /// Allocated while there is indirect light.
@@ -54,6 +55,12 @@ struct GatherView {
     own: Vec<FinalGatherResources>,
     /// If noise is evened out: what it was before.
     filter: Option<(Irradiance, IrradianceFilterResources)>,
+    tracers: ViewTracers,
+}
+
+/// Of whichever tracer follows a view's rays.
+#[derive(Debug)]
+pub(super) struct ViewTracers {
     image_space: ImageSpaceTracerResources,
     #[cfg(feature = "bvh")]
     bvh: BvhTracerResources,
@@ -96,6 +103,11 @@ impl ViewPasses {
             photon_splatter: (!gathers).then(splatter).transpose()?,
             final_gather: gathers.then(|| (FinalGather::new(device), IrradianceFilter::new(device))),
             upsampler: Upsampler::new(device),
+            specular_paths: SpecularPaths::new(
+                device,
+                settings.splatter_config.kernel,
+                settings.splatter_config.keeps_to_surfaces,
+            ),
         })
     }
 }
@@ -278,9 +290,7 @@ impl GatherView {
             band_rows,
             own: own.collect::<Result<_, _>>()?,
             filter: (settings.final_gather.filter_radius > 0).then(filter).transpose()?,
-            image_space: ImageSpaceTracerResources::new(device)?,
-            #[cfg(feature = "bvh")]
-            bvh: BvhTracerResources::new(device)?,
+            tracers: ViewTracers::new(device)?,
         })
     }
 
@@ -313,14 +323,11 @@ impl GatherView {
         };
         for own in &mut self.own {
             pass.record_rays(encoder, own, &gather_inputs);
-            let tracer = TracedRays {
+            let tracers = RayTracers {
                 rays: &self.rays,
-                env_maps,
-                image_space: &mut self.image_space,
-                #[cfg(feature = "bvh")]
-                bvh: &mut self.bvh,
+                own: &mut self.tracers,
             };
-            tracer.record(encoder, inputs)?;
+            tracers.record(encoder, inputs)?;
             pass.record(encoder, own, &gather_inputs);
             gather_inputs.rows[0] += self.band_rows;
         }
@@ -344,27 +351,42 @@ impl GatherView {
     }
 
     fn memory_use(&self) -> u64 {
-        let tracers = self.image_space.memory_use();
-        #[cfg(feature = "bvh")]
-        let tracers = tracers + self.bvh.memory_use();
         let filter = self.filter.as_ref().map_or(0, |f| f.0.memory_use() + f.1.memory_use());
         let own: u64 = self.own.iter().map(FinalGatherResources::memory_use).sum();
-        self.rays.memory_use() + own + filter + tracers
+        self.rays.memory_use() + own + filter + self.tracers.memory_use()
     }
 }
 
 /// Rays that one tracer or the other follows.
-struct TracedRays<'a> {
-    rays: &'a SurfaceRays,
-    env_maps: &'a EnvMaps,
-    image_space: &'a mut ImageSpaceTracerResources,
-    #[cfg(feature = "bvh")]
-    bvh: &'a mut BvhTracerResources,
+pub(super) struct RayTracers<'a> {
+    pub(super) rays: &'a SurfaceRays,
+    pub(super) own: &'a mut ViewTracers,
 }
 
-impl TracedRays<'_> {
+impl ViewTracers {
+    pub(super) fn new(device: &wgpu::Device) -> Result<Self, Error> {
+        Ok(Self {
+            image_space: ImageSpaceTracerResources::new(device)?,
+            #[cfg(feature = "bvh")]
+            bvh: BvhTracerResources::new(device)?,
+        })
+    }
+
+    pub(super) fn memory_use(&self) -> u64 {
+        let bytes = self.image_space.memory_use();
+        #[cfg(feature = "bvh")]
+        let bytes = bytes + self.bvh.memory_use();
+        bytes
+    }
+}
+
+impl RayTracers<'_> {
     /// Against triangles if the settings trace any, else through environment maps.
-    fn record(self, encoder: &mut wgpu::CommandEncoder, inputs: &IndirectViewInputs<'_>) -> Result<(), Error> {
+    pub(super) fn record(
+        self,
+        encoder: &mut wgpu::CommandEncoder,
+        inputs: &IndirectViewInputs<'_>,
+    ) -> Result<(), Error> {
         let passes = inputs.passes.1;
         #[cfg(feature = "bvh")]
         if let (Some(tracer), Some(geometry)) = (&passes.bvh_tracer, inputs.view.bvh) {
@@ -374,21 +396,21 @@ impl TracedRays<'_> {
                 rays: self.rays,
                 timestamps: inputs.view.timestamps,
             };
-            tracer.record_surface_rays(encoder, self.bvh, &ray_inputs);
+            tracer.record_surface_rays(encoder, &mut self.own.bvh, &ray_inputs);
             return Ok(());
         }
-        let Some(tracer) = &passes.image_space_tracer else {
+        let (Some(tracer), Some(env_maps)) = (&passes.image_space_tracer, inputs.scene.env_maps()) else {
             return Ok(());
         };
         let ray_inputs = ImageSpaceTracerRayInputs {
             queue: inputs.view.queue,
-            env_maps: self.env_maps,
+            env_maps,
             hierarchy: inputs.scene.depth_hierarchy(),
             rays: self.rays,
             settings: &inputs.settings.tracer,
             timestamps: inputs.view.timestamps,
         };
-        tracer.record_rays(encoder, self.image_space, &ray_inputs)
+        tracer.record_rays(encoder, &mut self.own.image_space, &ray_inputs)
     }
 }
 

@@ -10,6 +10,7 @@ mod plan;
 mod recapture;
 mod selection_schedule;
 mod settings;
+mod specular_view;
 
 pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};
 pub use plan::{Plan, PlannedStage, Stage};

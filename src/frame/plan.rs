@@ -42,8 +42,10 @@ pub enum Stage {
     IrradianceFilter,
     /// Irradiance of some pixels to all of them.
     Upsampler,
-    /// Photons by way of mirrors and glass.
-    CausticPhotons,
+    /// Photons sorted, for light at points that no pixel shows.
+    PhotonGrid,
+    /// What is seen in mirrors and through glass.
+    SpecularPaths,
     /// The sum.
     Composite,
 }
@@ -84,10 +86,10 @@ impl Plan {
         };
         let indirect = indirect(summary, settings);
         let specular: Vec<_> = summary.metals.iter().chain(&summary.dielectrics).cloned().collect();
-        let caustics = if specular.is_empty() {
-            "no specular surface".to_owned()
-        } else {
-            "not modelled yet".to_owned()
+        let specular = match (indirect.0, specular.is_empty()) {
+            (_, true) => (false, "no specular surface".to_owned()),
+            (false, _) => indirect.clone(),
+            (true, false) => (true, format!("seen in or through {}", specular.join(", "))),
         };
         let has_extent = summary.lights_with_extent > 0 || !summary.emissive_triangles.is_empty();
         let soft = match has_extent {
@@ -124,10 +126,11 @@ impl Plan {
                 stage(Stage::FinalGather, gathering.clone()),
                 stage(Stage::IrradianceFilter, filtering),
                 stage(Stage::Upsampler, upsampling),
-                stage(Stage::CausticPhotons, (false, caustics)),
+                stage(Stage::PhotonGrid, specular.clone()),
+                stage(Stage::SpecularPaths, specular),
                 stage(Stage::Composite, always("every view")),
             ],
-            simplifications: simplifications(summary),
+            simplifications: simplifications(summary, settings),
         }
     }
 
@@ -249,7 +252,8 @@ fn upsampling(indirect: &(bool, String), settings: &Settings) -> (bool, String) 
     }
 }
 
-fn simplifications(summary: &SceneSummary) -> Vec<String> {
+fn simplifications(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
+    let specular: Vec<_> = summary.metals.iter().chain(&summary.dielectrics).cloned().collect();
     let list = |names: &[String]| names.join(", ");
     let mut notes = Vec::new();
     if !summary.emissive.is_empty() && summary.emissive_triangles.is_empty() {
@@ -258,11 +262,14 @@ fn simplifications(summary: &SceneSummary) -> Vec<String> {
             list(&summary.emissive)
         ));
     }
-    if !summary.metals.is_empty() {
-        notes.push(format!("metal, treated as Lambertian: {}", list(&summary.metals)));
+    if settings.tracer_kind == TracerKind::ImageSpace && !summary.dielectrics.is_empty() {
+        notes.push(format!(
+            "glass whose inside no environment map sees, traced by its outside: {}",
+            list(&summary.dielectrics)
+        ));
     }
-    if !summary.dielectrics.is_empty() {
-        notes.push(format!("glass, treated as Lambertian: {}", list(&summary.dielectrics)));
+    if settings.indirect_method == IndirectMethod::FinalGather && !(specular.is_empty()) {
+        notes.push(format!("gathered light does not come by way of {}", list(&specular)));
     }
     if summary.environment_lights > 0 {
         notes.push("the environment lights nothing yet".to_owned());
@@ -435,7 +442,7 @@ mod tests {
             ..summary()
         };
         let text = Plan::for_scene(&summary, &Settings::balanced()).to_string();
-        for name in ["ceiling lamp", "chrome", "window", "irradiance is a point's"] {
+        for name in ["ceiling lamp", "window", "irradiance is a point's"] {
             assert!(text.contains(name), "{name} in\n{text}");
         }
     }

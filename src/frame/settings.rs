@@ -125,6 +125,9 @@ pub struct Settings {
     pub indirect_method: IndirectMethod,
     /// Where it is gathered.
     pub final_gather: FinalGatherSettings,
+    /// Most specular surfaces that the eye looks through or into one behind the other, 1 to 32: a ball of glass has two. What lies
+    /// behind more is black.
+    pub specular_surfaces: u32,
     /// How photons are drawn: gathered in f32, or blended.
     pub splatter_config: PhotonSplatterConfig,
     /// How wide: more photons under a kernel are smoother and blurrier. And what is done at edges.
@@ -195,6 +198,7 @@ impl Settings {
             tracer: ImageSpaceTracerSettings::default(),
             indirect_method: IndirectMethod::default(),
             final_gather: FinalGatherSettings::default(),
+            specular_surfaces: 6,
             splatter_config: PhotonSplatterConfig::default(),
             splatter: PhotonSplatterSettings::default(),
             radius_alpha: 2.0 / 3.0,
@@ -469,6 +473,8 @@ const KNOBS: &[Knob] = &[
         ["splatting", IndirectMethod::Splatting],
         ["final-gather", IndirectMethod::FinalGather]
     ),
+    field!("specular.surfaces", "1 to 32", specular_surfaces, |v| (1..=32)
+        .contains(&v)),
     field!("final_gather.rays", "1 to 4096", final_gather.rays, |v| (1..=4096)
         .contains(&v)),
     field!("final_gather.map_size", "4 to 8192", final_gather.map_size, |v| (4

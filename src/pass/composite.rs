@@ -1,8 +1,9 @@
-//! Puts light together: L = L_e + ρ/π · (E_direct + E_indirect), scaled back to world units.
+//! Puts light together: L = L_e + ρ/π · (E_direct + E_indirect), or of specular surfaces what is seen in them, scaled back to
+//! world units.
 //!
-//! Inputs: [`GBuffer`], two [`Irradiance`]s. Output: [`Radiance`]. Cost: one full-screen pass. Source: Larsen 2004,
-//! chapter 13; the 1/π that is missing from Yao et al., soft shadows and image-space photon mapping, Eq. 1. Limits: every
-//! surface is Lambertian.
+//! Inputs: [`GBuffer`], two [`Irradiance`]s, and what [`SpecularPaths`](super::SpecularPaths) gives. Output: [`Radiance`]. Cost: one full-screen pass. Source: Larsen 2004,
+//! chapter 13; the 1/π that is missing from Yao et al., soft shadows and image-space photon mapping, Eq. 1. Limits: a
+//! surface is either Lambertian or specular.
 
 use super::full_screen::{FullScreen, FullScreenResources};
 use crate::gpu::Slot;
@@ -20,16 +21,19 @@ pub(crate) mod gpu {
         pub(crate) direct_weight: f32,
         pub(crate) indirect_weight: f32,
         pub(crate) emission_weight: f32,
+        pub(crate) specular_weight: f32,
     }
 }
 
 /// Bindings of `shaders/pass/composite.wgsl`, in order.
-pub(crate) const SLOTS: [Slot; 6] = [
+pub(crate) const SLOTS: [Slot; 8] = [
     Slot::Uniform,
     Slot::Uniform,
     Slot::Texture,
     Slot::Texture,
     Slot::Texture,
+    Slot::Texture,
+    Slot::UintTexture,
     Slot::Texture,
 ];
 
@@ -81,6 +85,8 @@ pub struct CompositeInputs<'a> {
     pub direct: &'a Irradiance,
     /// Light by way of other surfaces.
     pub indirect: &'a Irradiance,
+    /// Radiance of specular surfaces, unit frame; `None`: they are black.
+    pub specular: Option<&'a Irradiance>,
     /// Written; of the format that the pass was made for.
     pub radiance: &'a Radiance,
     /// What to show.
@@ -109,6 +115,7 @@ impl Composite {
             direct_weight: inputs.settings.direct,
             indirect_weight: inputs.settings.indirect,
             emission_weight: inputs.settings.emission,
+            specular_weight: if inputs.specular.is_some() { 1.0 } else { 0.0 },
         };
         inputs
             .queue
@@ -120,6 +127,8 @@ impl Composite {
             (&views.emission).into(),
             inputs.direct.view().into(),
             inputs.indirect.view().into(),
+            inputs.g_buffer.surfaces().into(),
+            inputs.specular.unwrap_or(inputs.direct).view().into(),
         ];
         let targets = [inputs.radiance.view()];
         self.pass

@@ -22,10 +22,12 @@ pub(crate) mod image_space_tracer;
 pub(crate) mod irradiance_filter;
 pub(crate) mod nearest_occluder;
 pub(crate) mod photon_emitter;
+pub(crate) mod photon_grid;
 pub(crate) mod photon_splatter;
 pub(crate) mod photon_walk;
 mod shadow_map_capture;
 pub(crate) mod soft_shadow;
+pub(crate) mod specular_paths;
 pub(crate) mod stable_sort;
 pub(crate) mod tone_map;
 pub(crate) mod trace_statistics;
@@ -60,6 +62,7 @@ pub use irradiance_filter::{
 };
 pub use nearest_occluder::{NearestOccluder, NearestOccluderInputs, NearestOccluderResources};
 pub use photon_emitter::{PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources};
+pub use photon_grid::{PhotonGrid, PhotonGridInputs, PhotonGridResources};
 pub(crate) use photon_splatter::LARGEST_RADIUS;
 pub use photon_splatter::{
     Bandwidth, BoundaryCorrection, Kernel, MarkedSplatInputs, PhotonSplatter, PhotonSplatterConfig,
@@ -69,6 +72,7 @@ pub use photon_walk::SharedHop;
 pub use shadow_map_capture::{ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources};
 pub(crate) use soft_shadow::MAX_TAPS;
 pub use soft_shadow::{PenumbraSearch, SoftShadow, SoftShadowInputs, SoftShadowResources, SoftShadowSettings};
+pub use specular_paths::{SpecularPaths, SpecularPathsInputs, SpecularPathsResources};
 pub use tone_map::{ToneCurve, ToneMap, ToneMapInputs, ToneMapResources, ToneMapSettings};
 pub use trace_statistics::{HopStatistics, TraceStatistics, TraceStatisticsInputs, TraceStatisticsResources};
 pub use upsampler::{Upsampler, UpsamplerInputs, UpsamplerResources, UpsamplerSettings};

@@ -1,5 +1,16 @@
 // Irradiance at the surface points that texels of environment maps show: what lights give directly, and the photons around.
 
+struct Params {
+    map_size: u32,
+    // Texels of the irradiance along a face
+    size: u32,
+    light_count: u32,
+    shadow_map_size: u32,
+    // 1: kernels count by the part of them that lies on the surface
+    is_corrected: u32,
+    sample_offset: u32,
+}
+
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var env_maps: texture_2d_array<u32>;
 // w: 1 where the map is in use
@@ -10,9 +21,7 @@
 @group(0) @binding(6) var shadow_maps: texture_2d_array<u32>;
 @group(0) @binding(7) var irradiance: texture_storage_2d_array<rgba32float, write>;
 @group(0) @binding(8) var<storage, read> polygons: array<Polygon>;
-
-alias Receivers = f32;
-alias Surfaces = u32;
+@group(0) @binding(9) var<uniform> grid: GridParams;
 
 // Random dimension of the turn of the points that look for rims: none that the walk uses.
 const LIGHTING_DIMENSION: u32 = 4097u;
@@ -43,17 +52,7 @@ fn direct_light(p: vec3f, n: vec3f) -> vec3f {
 }
 
 fn indirect_light(receiver: Receiver) -> vec3f {
-    var g = gathered_nothing(receiver);
-    let cell = cell_of(receiver.position);
-    let first = max(cell - 1, vec3i(0));
-    let last = min(cell + 1, vec3i(i32(params.cells) - 1));
-    for (var z = first.z; z <= last.z; z++) {
-        for (var y = first.y; y <= last.y; y++) {
-            // Those of a row of cells lie one behind the other.
-            let start = first_splats[cell_index(vec3i(first.x, y, z))];
-            gather_range(&g, start, first_splats[cell_index(vec3i(last.x, y, z)) + 1u]);
-        }
-    }
+    let g = grid_light(receiver);
     let sum = vec3f(g.red, g.green, g.blue);
     let light = sum.x + sum.y + sum.z;
     if params.is_corrected == 0u || !(light > 0.0) {

@@ -1,6 +1,6 @@
 // Photons in the order of the cells of space that they lie in, ready to be added up.
 
-@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(0) var<uniform> grid: GridParams;
 @group(0) @binding(1) var<storage, read> photons: array<Photon>;
 // By slot before they are sorted, by cell after
 @group(0) @binding(2) var<storage, read_write> keys: array<u32>;
@@ -10,17 +10,17 @@
 @group(0) @binding(5) var<storage, read_write> first_splats: array<u32>;
 
 fn slot_of(id: vec3u) -> u32 {
-    return select(id.y * params.row + id.x, 0xffffffffu, id.x >= params.row);
+    return select(id.y * grid.row + id.x, 0xffffffffu, id.x >= grid.row);
 }
 
 @compute @workgroup_size(64)
 fn find_cells(@builtin(global_invocation_id) id: vec3u) {
     let index = slot_of(id);
-    if index >= params.slot_count {
+    if index >= grid.slot_count {
         return;
     }
-    let photon = photons[params.first_slot + index];
-    keys[index] = select(cell_total(), cell_index(cell_of(photon.position)), photon_is_splatted(photon.state));
+    let photon = photons[grid.first_slot + index];
+    keys[index] = select(grid_total(), grid_index(grid_cell(photon.position)), photon_is_splatted(photon.state));
     slots[index] = index;
 }
 
@@ -31,19 +31,19 @@ fn find_first(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let cell = 64u * (group.y * groups.x + group.x) + lane;
-    if cell <= cell_total() {
-        first_splats[cell] = first_of_key(cell, params.slot_count);
+    if cell <= grid_total() {
+        first_splats[cell] = first_of_key(cell, grid.slot_count);
     }
 }
 
 @compute @workgroup_size(64)
 fn prepare_splats(@builtin(global_invocation_id) id: vec3u) {
     let index = slot_of(id);
-    if index >= params.slot_count || keys[index] >= cell_total() {
+    if index >= grid.slot_count || keys[index] >= grid_total() {
         return;
     }
-    let photon = photons[params.first_slot + slots[index]];
-    let h = min(bandwidth_radius(params.bandwidth, photon), 2.0 / f32(params.cells));
+    let photon = photons[grid.first_slot + slots[index]];
+    let h = min(bandwidth_radius(grid.bandwidth, photon), 2.0 / f32(grid.cells));
     if h > 0.0 {
         splats[index] = splat_record(photon, h);
     } else {

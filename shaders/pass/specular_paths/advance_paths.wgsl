@@ -1,0 +1,102 @@
+// What the rays of paths have met: a diffuse surface ends a path with the light that it sends out, a specular one lets it go on.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read_write> rays: array<SurfaceRay>;
+@group(0) @binding(2) var<storage, read> hits: array<SurfaceHit>;
+@group(0) @binding(3) var<storage, read_write> paths: array<SpecularPath>;
+@group(0) @binding(4) var<uniform> grid: GridParams;
+@group(0) @binding(5) var<storage, read> splats: array<Splat>;
+@group(0) @binding(6) var<storage, read> first_splats: array<u32>;
+@group(0) @binding(7) var<storage, read> lights: array<Light>;
+@group(0) @binding(8) var<storage, read> polygons: array<Polygon>;
+@group(0) @binding(9) var shadow_maps: texture_2d_array<u32>;
+@group(0) @binding(10) var radiance: texture_storage_2d<rgba32float, write>;
+
+const SPECULAR_INVERSE_PI: f32 = 0.318309886;
+// A lamp that is set into a surface stands before it, though rounding may say otherwise.
+const SPECULAR_BEFORE: f32 = 1.0 - 0x1p-12;
+
+// Radiance of the flat lamps whose fronts a ray crosses before `furthest`. They block nothing.
+fn lamps_crossed(ray: SurfaceRay, furthest: f32) -> vec3f {
+    var sum = vec3f(0.0);
+    for (var i = 0u; i < params.light_count; i++) {
+        if lights[i].kind != LIGHT_AREA {
+            continue;
+        }
+        let first = lights[i].first_polygon;
+        // Behind those that stand for others are the others.
+        let is_for_both = lights[i].polygon_count == lights[i].direct_polygons;
+        let from_polygon = first + select(lights[i].direct_polygons, 0u, is_for_both);
+        for (var k = from_polygon; k < first + lights[i].polygon_count; k++) {
+            if polygon_crossed(polygons[k], ray.position, ray.direction) * SPECULAR_BEFORE < furthest {
+                sum += polygons[k].radiance;
+            }
+        }
+    }
+    return sum;
+}
+
+fn direct_light(p: vec3f, n: vec3f) -> vec3f {
+    var sum = vec3f(0.0);
+    for (var i = 0u; i < params.light_count; i++) {
+        let e = light_irradiance(lights[i], p, n);
+        if any(e > vec3f(0.0)) && is_lit(lights[i], p, n, params.shadow_map_size) {
+            sum += e;
+        }
+    }
+    return sum;
+}
+
+// What a path is after its ray.
+fn advanced(before: SpecularPath, index: u32, pixel: vec2u) -> SpecularPath {
+    var path = before;
+    let ray = rays[index];
+    let hit = hits[index];
+    let is_hit = hit.kind == HIT_SURFACE || hit.kind == HIT_TENTATIVE;
+    let furthest = select(1e30, hit.distance, is_hit);
+    let weight = select(params.indirect_weight, params.direct_weight, params.step == 0u);
+    path.radiance += weight * path.throughput * lamps_crossed(ray, furthest);
+    path.goes_on = 0u;
+    rays[index] = specular_no_ray();
+    if !is_hit {
+        return path;
+    }
+    let p = ray.position + hit.distance * ray.direction;
+    let n = octahedral_unpack(hit.normal);
+    let color = reflectance_unpack(hit.reflectance);
+    let lobe = hit.lobe & LOBE_BITS;
+    if !lobe_is_specular(lobe) {
+        let g = grid_light(Receiver(p, n, 0u, true));
+        let irradiance = direct_light(p, n) + vec3f(g.red, g.green, g.blue);
+        path.radiance += params.indirect_weight * path.throughput * color * SPECULAR_INVERSE_PI * irradiance;
+        return path;
+    }
+    if params.step + 1u == params.steps {
+        return path;
+    }
+    let scatterer = scatter_by_lobe(lobe, n, (hit.lobe & HIT_BACK) == 0u, color);
+    let scattering = scatter_sample(scatterer, -ray.direction, specular_random(pixel, params.step + 1u));
+    path.throughput *= scattering.weight;
+    path.goes_on = u32(any(path.throughput > vec3f(0.0)));
+    if path.goes_on == 1u {
+        rays[index] = specular_ray(p, n, scattering.direction);
+    }
+    return path;
+}
+
+@compute @workgroup_size(8, 8)
+fn advance_paths(@builtin(global_invocation_id) id: vec3u) {
+    if id.x >= params.width || id.y >= params.row_count {
+        return;
+    }
+    let index = id.y * params.width + id.x;
+    let pixel = vec2u(id.x, params.first_row + id.y);
+    var path = paths[index];
+    if path.goes_on == 1u {
+        path = advanced(path, index, pixel);
+        paths[index] = path;
+    }
+    if params.step + 1u == params.steps {
+        textureStore(radiance, pixel, vec4f(path.radiance, 1.0));
+    }
+}

@@ -1,0 +1,82 @@
+//! What one view sees in mirrors and through glass.
+
+use super::indirect_view::{IndirectViewInputs, MOST_RAYS, RayTracers, ViewTracers};
+use crate::Error;
+use crate::pass::{SpecularPathsInputs, SpecularPathsResources};
+use crate::resource::{Irradiance, ShadowMaps, SurfaceRays};
+
+/// Allocated while anything specular may be in view.
+#[derive(Debug)]
+pub(super) struct SpecularView {
+    /// Of one band after the other.
+    rays: SurfaceRays,
+    band_rows: u32,
+    /// Of each band.
+    own: Vec<SpecularPathsResources>,
+    tracers: ViewTracers,
+    radiance: Irradiance,
+}
+
+impl SpecularView {
+    pub(super) fn new(device: &wgpu::Device, steps: u32, size: [u32; 2]) -> Result<Self, Error> {
+        let band_rows = (MOST_RAYS / u64::from(size[0])).clamp(1, u64::from(size[1])) as u32;
+        let pixels = size[0] * band_rows;
+        let own = (0..size[1].div_ceil(band_rows)).map(|_| SpecularPathsResources::new(device, pixels, steps));
+        Ok(Self {
+            rays: SurfaceRays::new(device, pixels)?,
+            band_rows,
+            own: own.collect::<Result<_, _>>()?,
+            tracers: ViewTracers::new(device)?,
+            radiance: Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?,
+        })
+    }
+
+    /// At pixels whose surface is specular.
+    pub(super) fn radiance(&self) -> &Irradiance {
+        &self.radiance
+    }
+
+    /// Records the paths of all pixels.
+    pub(super) fn record(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        inputs: &IndirectViewInputs<'_>,
+        shadow_maps: &ShadowMaps,
+    ) -> Result<(), Error> {
+        let Some(photons) = inputs.scene.photon_grid() else {
+            return Ok(());
+        };
+        let pass = &inputs.passes.0.specular_paths;
+        let mut path_inputs = SpecularPathsInputs {
+            queue: inputs.view.queue,
+            g_buffer: inputs.g_buffer,
+            rows: [0, self.band_rows],
+            rays: &self.rays,
+            photons,
+            lights: inputs.lights,
+            shadow_maps,
+            radiance: &self.radiance,
+            weights: [inputs.view.composite.direct, inputs.view.composite.indirect],
+            sample_offset: inputs.sample_offset,
+            timestamps: inputs.view.timestamps,
+        };
+        for own in &mut self.own {
+            pass.record_rays(encoder, own, &path_inputs);
+            for step in 0..own.steps() {
+                let tracers = RayTracers {
+                    rays: &self.rays,
+                    own: &mut self.tracers,
+                };
+                tracers.record(encoder, inputs)?;
+                pass.record(encoder, own, &path_inputs, step);
+            }
+            path_inputs.rows[0] += self.band_rows;
+        }
+        Ok(())
+    }
+
+    pub(super) fn memory_use(&self) -> u64 {
+        let own: u64 = self.own.iter().map(SpecularPathsResources::memory_use).sum();
+        self.rays.memory_use() + own + self.tracers.memory_use() + self.radiance.memory_use()
+    }
+}
