@@ -296,8 +296,8 @@ fn twins() -> Vec<Twin> {
             map_size, size, light_count, shadow_map_size, is_corrected, sample_offset,
         }),
         twin!(wgsl::SPECULAR_PATHS_BEGIN, "Params", specular_paths::gpu::Params {
-            width, first_row, row_count, step, steps, sample_offset, light_count, shadow_map_size, direct_weight,
-            indirect_weight,
+            width, first_row, row_count, step, steps, round, rounds, sample_offset, light_count, shadow_map_size,
+            direct_weight, indirect_weight,
         }),
         twin!(wgsl::SPECULAR_PATHS_BEGIN, "SpecularPath", specular_paths::gpu::SpecularPath {
             throughput, goes_on, radiance, _pad,

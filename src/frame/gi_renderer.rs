@@ -16,8 +16,8 @@ use super::{IndirectMethod, Plan, Settings, Stage};
 use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, CoverageMeasure, DirectLight, DirectLightInputs,
     DirectLightResources, EnvMapSelector, GBufferCapture, GBufferCaptureInputs, NearestOccluder, NearestOccluderInputs,
-    NearestOccluderResources, PhotonSplatter, PhotonSplatterResources, ShadowMapCapture, ShadowMapCaptureInputs,
-    ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources,
+    NearestOccluderResources, PathShape, PhotonSplatter, PhotonSplatterResources, ShadowMapCapture,
+    ShadowMapCaptureInputs, ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources,
 };
 #[cfg(feature = "bvh")]
 use crate::resource::BvhGeometry;
@@ -773,8 +773,11 @@ impl GiRenderer {
         if !self.plan().is_some_and(|p| p.is_on(Stage::SpecularPaths)) {
             view.specular = None;
         } else if view.specular.is_none() {
-            // The last ray is one from a specular surface to a diffuse one.
-            view.specular = Some(SpecularView::new(device, self.settings.specular_surfaces, size)?);
+            let shape = PathShape {
+                steps: self.settings.specular_surfaces,
+                rounds: self.settings.specular_paths,
+            };
+            view.specular = Some(SpecularView::new(device, shape, size)?);
         }
         Ok(())
     }

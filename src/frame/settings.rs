@@ -128,6 +128,9 @@ pub struct Settings {
     /// Most specular surfaces that the eye looks through or into one behind the other, 1 to 32: a ball of glass has two. What lies
     /// behind more is black.
     pub specular_surfaces: u32,
+    /// Paths from each pixel whose surface is specular, 1 to 64: noise of rough surfaces and of glass, which reflects or transmits
+    /// by chance, falls as their root.
+    pub specular_paths: u32,
     /// How photons are drawn: gathered in f32, or blended.
     pub splatter_config: PhotonSplatterConfig,
     /// How wide: more photons under a kernel are smoother and blurrier. And what is done at edges.
@@ -155,6 +158,8 @@ impl Settings {
     pub fn fast() -> Self {
         Self {
             photons: 60_000,
+            specular_surfaces: 4,
+            specular_paths: 1,
             emission_importance: 0.0,
             env_map_count: 12,
             env_map_size: 64,
@@ -199,6 +204,7 @@ impl Settings {
             indirect_method: IndirectMethod::default(),
             final_gather: FinalGatherSettings::default(),
             specular_surfaces: 6,
+            specular_paths: 4,
             splatter_config: PhotonSplatterConfig::default(),
             splatter: PhotonSplatterSettings::default(),
             radius_alpha: 2.0 / 3.0,
@@ -214,6 +220,8 @@ impl Settings {
         Self {
             frames: 64,
             photons: 200_000,
+            specular_surfaces: 12,
+            specular_paths: 1,
             emission_importance: 0.0,
             env_map_count: 16,
             env_map_size: 256,
@@ -473,6 +481,7 @@ const KNOBS: &[Knob] = &[
         ["splatting", IndirectMethod::Splatting],
         ["final-gather", IndirectMethod::FinalGather]
     ),
+    field!("specular.paths", "1 to 64", specular_paths, |v| (1..=64).contains(&v)),
     field!("specular.surfaces", "1 to 32", specular_surfaces, |v| (1..=32)
         .contains(&v)),
     field!("final_gather.rays", "1 to 4096", final_gather.rays, |v| (1..=4096)

@@ -2,7 +2,7 @@
 
 use super::indirect_view::{IndirectViewInputs, MOST_RAYS, RayTracers, ViewTracers};
 use crate::Error;
-use crate::pass::{SpecularPathsInputs, SpecularPathsResources};
+use crate::pass::{PathShape, SpecularPathsInputs, SpecularPathsResources};
 use crate::resource::{Irradiance, ShadowMaps, SurfaceRays};
 
 /// Allocated while anything specular may be in view.
@@ -18,10 +18,10 @@ pub(super) struct SpecularView {
 }
 
 impl SpecularView {
-    pub(super) fn new(device: &wgpu::Device, steps: u32, size: [u32; 2]) -> Result<Self, Error> {
+    pub(super) fn new(device: &wgpu::Device, shape: PathShape, size: [u32; 2]) -> Result<Self, Error> {
         let band_rows = (MOST_RAYS / u64::from(size[0])).clamp(1, u64::from(size[1])) as u32;
         let pixels = size[0] * band_rows;
-        let own = (0..size[1].div_ceil(band_rows)).map(|_| SpecularPathsResources::new(device, pixels, steps));
+        let own = (0..size[1].div_ceil(band_rows)).map(|_| SpecularPathsResources::new(device, pixels, shape));
         Ok(Self {
             rays: SurfaceRays::new(device, pixels)?,
             band_rows,
@@ -61,14 +61,17 @@ impl SpecularView {
             timestamps: inputs.view.timestamps,
         };
         for own in &mut self.own {
-            pass.record_rays(encoder, own, &path_inputs);
-            for step in 0..own.steps() {
-                let tracers = RayTracers {
-                    rays: &self.rays,
-                    own: &mut self.tracers,
-                };
-                tracers.record(encoder, inputs)?;
-                pass.record(encoder, own, &path_inputs, step);
+            let shape = own.shape();
+            for round in 0..shape.rounds {
+                pass.record_rays(encoder, own, &path_inputs, round);
+                for step in 0..shape.steps {
+                    let tracers = RayTracers {
+                        rays: &self.rays,
+                        own: &mut self.tracers,
+                    };
+                    tracers.record(encoder, inputs)?;
+                    pass.record(encoder, own, &path_inputs, [round, step]);
+                }
             }
             path_inputs.rows[0] += self.band_rows;
         }

@@ -72,7 +72,7 @@ pub use photon_walk::SharedHop;
 pub use shadow_map_capture::{ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources};
 pub(crate) use soft_shadow::MAX_TAPS;
 pub use soft_shadow::{PenumbraSearch, SoftShadow, SoftShadowInputs, SoftShadowResources, SoftShadowSettings};
-pub use specular_paths::{SpecularPaths, SpecularPathsInputs, SpecularPathsResources};
+pub use specular_paths::{PathShape, SpecularPaths, SpecularPathsInputs, SpecularPathsResources};
 pub use tone_map::{ToneCurve, ToneMap, ToneMapInputs, ToneMapResources, ToneMapSettings};
 pub use trace_statistics::{HopStatistics, TraceStatistics, TraceStatisticsInputs, TraceStatisticsResources};
 pub use upsampler::{Upsampler, UpsamplerInputs, UpsamplerResources, UpsamplerSettings};

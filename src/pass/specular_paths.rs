@@ -5,10 +5,11 @@
 //! (`rgba32float`, unit frame): of pixels whose surface is specular, zero of all others. Sources: Whitted 1980; Jensen 1996, for
 //! paths that end in a photon map; Walter et al. 2007 and Heitz 2018 for rough surfaces.
 //!
-//! Order, for each band of rows: [`SpecularPaths::record_rays`]; then for each step the tracer's `record_rays` and
-//! [`SpecularPaths::record`]. Cost: pixels × steps rays; where paths end, lights and the photons around, as an estimate at a
-//! pixel costs. Limits: a rough surface is seen along one direction a frame, so that its noise goes as frames are accumulated;
-//! direct light where a path ends has hard shadows; what is lost, or specular after the last step, is black.
+//! Order, for each band of rows and each round of one path a pixel: [`SpecularPaths::record_rays`]; then for each step the tracer's
+//! `record_rays` and [`SpecularPaths::record`]. Cost: pixels × rounds × steps rays; where paths end, lights and the photons around,
+//! as an estimate at a pixel costs. Limits: rough surfaces, and glass that reflects or transmits by chance, are noisy with few
+//! rounds, the same every frame while `sample_offset` is; direct
+//! light where a path ends has hard shadows; what is lost, or specular after the last step, is black.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::pass::{Kernel, PhotonGridResources};
@@ -27,6 +28,8 @@ pub(crate) mod gpu {
         pub(crate) row_count: u32,
         pub(crate) step: u32,
         pub(crate) steps: u32,
+        pub(crate) round: u32,
+        pub(crate) rounds: u32,
         pub(crate) sample_offset: u32,
         pub(crate) light_count: u32,
         pub(crate) shadow_map_size: u32,
@@ -46,7 +49,7 @@ pub(crate) mod gpu {
 }
 
 /// Bindings of `shaders/pass/specular_paths/begin_paths.wgsl`, in order.
-pub(crate) const BEGIN_SLOTS: [Slot; 8] = [
+pub(crate) const BEGIN_SLOTS: [Slot; 11] = [
     Slot::Uniform,
     Slot::Uniform,
     Slot::Texture,
@@ -55,6 +58,9 @@ pub(crate) const BEGIN_SLOTS: [Slot; 8] = [
     Slot::UintTexture,
     Slot::StorageMut,
     Slot::StorageMut,
+    Slot::Storage,
+    Slot::Storage,
+    Slot::UintArray,
 ];
 
 /// Bindings of `shaders/pass/specular_paths/advance_paths.wgsl`, in order.
@@ -85,12 +91,22 @@ pub struct SpecularPaths {
 /// Uniforms, paths and bind groups of one band of one view.
 #[derive(Debug)]
 pub struct SpecularPathsResources {
-    /// Of each step.
+    /// Of each step of each round.
     params: Vec<wgpu::Buffer>,
+    shape: PathShape,
     paths: wgpu::Buffer,
     pixels: u32,
     begin_groups: BindGroupCache,
     advance_groups: BindGroupCache,
+}
+
+/// How many paths, and how long.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PathShape {
+    /// Rays of a path: specular surfaces on it, the one that the eye sees among them.
+    pub steps: u32,
+    /// Paths of each pixel.
+    pub rounds: u32,
 }
 
 /// What a frame gives it.
@@ -122,7 +138,7 @@ pub struct SpecularPathsInputs<'a> {
 }
 
 impl SpecularPathsInputs<'_> {
-    fn params(&self, step: u32, resources: &SpecularPathsResources) -> gpu::Params {
+    fn params(&self, [round, step]: [u32; 2], resources: &SpecularPathsResources) -> gpu::Params {
         let [width, height] = self.g_buffer.size();
         let room = self.rays.count().min(resources.pixels) / width.max(1);
         gpu::Params {
@@ -130,7 +146,9 @@ impl SpecularPathsInputs<'_> {
             first_row: self.rows[0],
             row_count: self.rows[1].min(height.saturating_sub(self.rows[0])).min(room),
             step,
-            steps: resources.params.len() as u32,
+            steps: resources.shape.steps,
+            round,
+            rounds: resources.shape.rounds,
             sample_offset: self.sample_offset,
             light_count: self.lights.count(),
             shadow_map_size: self.shadow_maps.size(),
@@ -173,25 +191,27 @@ impl SpecularPaths {
         }
     }
 
-    /// Records the first rays, to be traced before the first step.
+    /// Records the first rays of a round, to be traced before its first step.
     pub fn record_rays(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         resources: &mut SpecularPathsResources,
         inputs: &SpecularPathsInputs<'_>,
+        round: u32,
     ) {
-        let params: Vec<_> = (0..resources.params.len() as u32)
-            .map(|step| inputs.params(step, resources))
-            .collect();
-        for (buffer, params) in resources.params.iter().zip(&params) {
-            inputs.queue.write_buffer(buffer, 0, bytemuck::bytes_of(params));
+        for step in 0..resources.shape.steps {
+            if let Some(buffer) = resources.params([round, step]) {
+                let params = inputs.params([round, step], resources);
+                inputs.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&params));
+            }
         }
-        let Some(first) = params.first() else {
+        let Some(buffer) = resources.params([round, 0]) else {
             return;
         };
+        let first = inputs.params([round, 0], resources);
         let views = inputs.g_buffer.views();
         let bound = [
-            (&resources.params[0]).into(),
+            buffer.into(),
             inputs.g_buffer.view_buffer().into(),
             (&views.depth).into(),
             (&views.normal).into(),
@@ -199,6 +219,9 @@ impl SpecularPaths {
             inputs.g_buffer.surfaces().into(),
             inputs.rays.buffer().into(),
             (&resources.paths).into(),
+            inputs.lights.buffer().into(),
+            inputs.lights.polygons().into(),
+            inputs.shadow_maps.view().into(),
         ];
         let label = "lightfall::SpecularPaths::begin";
         let cache = &mut resources.begin_groups;
@@ -209,18 +232,19 @@ impl SpecularPaths {
         pass.dispatch_workgroups(first.width.div_ceil(8), first.row_count.div_ceil(8), 1);
     }
 
-    /// Records step `step` of as many as the resources were made for, with the inputs of `record_rays`. Others are left out.
+    /// Records a round's step, counted from 0, with the inputs of `record_rays`. Those that the resources were not made for are
+    /// left out.
     pub fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         resources: &mut SpecularPathsResources,
         inputs: &SpecularPathsInputs<'_>,
-        step: u32,
+        [round, step]: [u32; 2],
     ) {
-        let Some(buffer) = resources.params.get(step as usize) else {
+        let Some(buffer) = resources.params([round, step]) else {
             return;
         };
-        let params = inputs.params(step, resources);
+        let params = inputs.params([round, step], resources);
         let bound = [
             buffer.into(),
             inputs.rays.buffer().into(),
@@ -245,15 +269,18 @@ impl SpecularPaths {
 }
 
 impl SpecularPathsResources {
-    /// For so many pixels, and paths of up to `steps` rays.
+    /// For so many pixels.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`].
-    pub fn new(device: &wgpu::Device, pixels: u32, steps: u32) -> Result<Self, Error> {
+    pub fn new(device: &wgpu::Device, pixels: u32, shape: PathShape) -> Result<Self, Error> {
         let params = || device::uniform_buffer::<gpu::Params>(device, "lightfall::SpecularPaths::params");
         let bytes = u64::from(pixels.max(1)) * size_of::<gpu::SpecularPath>() as u64;
         Ok(Self {
-            params: (0..steps).map(|_| params()).collect::<Result<_, _>>()?,
+            params: (0..shape.steps * shape.rounds)
+                .map(|_| params())
+                .collect::<Result<_, _>>()?,
+            shape,
             paths: device::buffer(
                 device,
                 "lightfall::SpecularPaths::paths",
@@ -261,14 +288,20 @@ impl SpecularPathsResources {
                 wgpu::BufferUsages::STORAGE,
             )?,
             pixels,
-            begin_groups: BindGroupCache::default(),
-            advance_groups: BindGroupCache::for_uses(steps.max(1) as usize),
+            begin_groups: BindGroupCache::for_uses(shape.rounds.max(1) as usize),
+            advance_groups: BindGroupCache::for_uses((shape.steps * shape.rounds).max(1) as usize),
         })
     }
 
-    /// Rays that a path may have.
-    pub fn steps(&self) -> u32 {
-        self.params.len() as u32
+    /// What they were made for.
+    pub fn shape(&self) -> PathShape {
+        self.shape
+    }
+
+    fn params(&self, [round, step]: [u32; 2]) -> Option<&wgpu::Buffer> {
+        let is_known = step < self.shape.steps;
+        let index = round as usize * self.shape.steps as usize + step as usize;
+        self.params.get(index).filter(|_| is_known)
     }
 
     /// Bytes allocated.

@@ -71,10 +71,12 @@ fn advanced(before: SpecularPath, index: u32, pixel: vec2u) -> SpecularPath {
         path.radiance += params.indirect_weight * path.throughput * color * SPECULAR_INVERSE_PI * irradiance;
         return path;
     }
+    let scatterer = scatter_by_lobe(lobe, n, (hit.lobe & HIT_BACK) == 0u, color);
+    let punctual = specular_punctual(scatterer, p, -ray.direction);
+    path.radiance += params.indirect_weight * path.throughput * punctual;
     if params.step + 1u == params.steps {
         return path;
     }
-    let scatterer = scatter_by_lobe(lobe, n, (hit.lobe & HIT_BACK) == 0u, color);
     let scattering = scatter_sample(scatterer, -ray.direction, specular_random(pixel, params.step + 1u));
     path.throughput *= scattering.weight;
     path.goes_on = u32(any(path.throughput > vec3f(0.0)));
@@ -96,7 +98,7 @@ fn advance_paths(@builtin(global_invocation_id) id: vec3u) {
         path = advanced(path, index, pixel);
         paths[index] = path;
     }
-    if params.step + 1u == params.steps {
-        textureStore(radiance, pixel, vec4f(path.radiance, 1.0));
+    if params.step + 1u == params.steps && params.round + 1u == params.rounds {
+        textureStore(radiance, pixel, vec4f(path.radiance / f32(params.rounds), 1.0));
     }
 }

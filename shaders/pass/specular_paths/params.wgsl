@@ -9,6 +9,9 @@ struct Params {
     step: u32,
     // Steps in all
     steps: u32,
+    // Paths of each pixel before this one, and in all
+    round: u32,
+    rounds: u32,
     sample_offset: u32,
     light_count: u32,
     shadow_map_size: u32,
@@ -22,12 +25,13 @@ struct SpecularPath {
     throughput: vec3f,
     // 0: it has ended
     goes_on: u32,
+    // Of all of the pixel's paths so far
     radiance: vec3f,
 }
 
-// Four numbers in [0, 1) for each pixel and surface on its path.
+// Four numbers in [0, 1) for each pixel, path and surface on it.
 fn specular_random(pixel: vec2u, surface: u32) -> vec4f {
-    let word = hash_pcg4d(vec4u(pixel, params.sample_offset, 0x5bec0000u + surface));
+    let word = hash_pcg4d(vec4u(pixel, params.sample_offset, 0x5bec0000u + 64u * params.round + surface));
     return vec4f(word >> vec4u(8u)) * 0x1p-24;
 }
 
@@ -35,6 +39,32 @@ fn specular_random(pixel: vec2u, surface: u32) -> vec4f {
 fn specular_no_ray() -> SurfaceRay {
     let away = vec3f(0.57735027);
     return SurfaceRay(8.0 * away, octahedral_pack(away), away, 0u);
+}
+
+// Radiance that a rough surface sends towards the eye of lights that no ray can run into: point lights, spots and suns.
+fn specular_punctual(scatterer: Scatterer, p: vec3f, outgoing: vec3f) -> vec3f {
+    var sum = vec3f(0.0);
+    if scatter_is_smooth(scatterer) {
+        return sum;
+    }
+    for (var i = 0u; i < params.light_count; i++) {
+        if lights[i].kind == LIGHT_AREA {
+            continue;
+        }
+        var incoming = -lights[i].direction;
+        if lights[i].kind != LIGHT_DIRECTIONAL {
+            incoming = normalize(lights[i].position - p);
+        }
+        let scattered = scatter_evaluate(scatterer, outgoing, incoming).rgb;
+        // Irradiance of a surface across the light.
+        let e = light_irradiance(lights[i], p, incoming);
+        let n = scatterer.frame[2];
+        let side = select(-n, n, dot(n, incoming) > 0.0);
+        if any(scattered * e > vec3f(0.0)) && is_lit(lights[i], p, side, params.shadow_map_size) {
+            sum += scattered * e;
+        }
+    }
+    return sum;
 }
 
 // The ray that goes on from a surface.

@@ -1,0 +1,340 @@
+//! Mirrors, metal and glass: what photons do at them, and what the eye sees in them.
+#![cfg(all(feature = "bvh", feature = "reference"))]
+
+mod common;
+
+use common::evaluate::run;
+use common::{Component, Gpu, Offline, Reference, assert_no_errors, gpu, offline};
+use lightfall::frame::{Settings, Stage, TracerKind};
+use lightfall::glam::{DAffine3, DQuat, DVec3, Vec3};
+use lightfall::pass::{Bandwidth, PhotonSplatterSettings};
+use lightfall::read_buffer_blocking;
+use lightfall::reference::{PathComponent, PathTracerSettings};
+use lightfall::resource::{Photon, PhotonState};
+use lightfall::scene::{Instance, Light, Material, Mesh, Scene, UnitFrame, samples};
+
+const SIZE: [u32; 2] = [48, 48];
+
+fn settings() -> Settings {
+    Settings {
+        photons: 25_000,
+        frames: 8,
+        bounces: 4,
+        shadow_map_size: 256,
+        specular_paths: 1,
+        specular_surfaces: 5,
+        tracer_kind: TracerKind::Bvh,
+        // Narrow kernels: frames average their noise.
+        splatter: PhotonSplatterSettings {
+            bandwidth: Bandwidth::Density {
+                photons: 60.0,
+                clamp: [0.25, 1.0],
+            },
+            ..Default::default()
+        },
+        ..Settings::balanced()
+    }
+}
+
+fn mirror() -> Material {
+    Material {
+        name: "mirror".into(),
+        base_color: [0.9; 3],
+        metallic: 1.0,
+        roughness: 0.0,
+        ..Material::default()
+    }
+}
+
+fn glass() -> Material {
+    Material {
+        name: "glass".into(),
+        transmission: 1.0,
+        roughness: 0.0,
+        ..Material::default()
+    }
+}
+
+fn brass() -> Material {
+    Material {
+        name: "brass".into(),
+        base_color: [0.9, 0.7, 0.3],
+        metallic: 1.0,
+        roughness: 0.3,
+        ..Material::default()
+    }
+}
+
+/// The Cornell box with a ball of this material in place of its blocks.
+fn with_ball(material: Material) -> Scene {
+    let mut scene = samples::cornell(0.0);
+    let mut ball = samples::furnace(0.0, 0.0).meshes.remove(0);
+    for triangle in ball.indices.chunks_exact_mut(3) {
+        triangle.swap(1, 2);
+    }
+    ball.normals = ball.positions.clone();
+    scene.meshes.push(ball);
+    scene.materials.push(material);
+    scene.instances.push(Instance {
+        transform: DAffine3::from_scale_rotation_translation(
+            DVec3::splat(0.8),
+            DQuat::IDENTITY,
+            DVec3::new(1.9, 2.6, 1.5),
+        ),
+        ..Instance::new(scene.meshes.len() - 1, scene.materials.len() - 1)
+    });
+    scene
+}
+
+fn means(pixels: &[[f32; 3]]) -> DVec3 {
+    pixels.iter().map(|&p| Vec3::from(p).as_dvec3()).sum::<DVec3>() / pixels.len() as f64
+}
+
+fn reference(gpu: &Gpu, scene: &Scene, component: PathComponent, samples: u32) -> DVec3 {
+    let settings = PathTracerSettings {
+        component,
+        bounces: 4,
+        ..PathTracerSettings::default()
+    };
+    let mut reference = Reference::new(gpu, scene.clone(), &settings, 0, SIZE).unwrap();
+    (0..samples).for_each(|_| reference.render_sample(None).unwrap());
+    means(&reference.read().unwrap().mean)
+}
+
+#[test]
+fn lobes_survive_packing_to_within_their_quantum() {
+    let Some(gpu) = gpu() else { return };
+    let inputs: Vec<[f32; 4]> = (0..=128)
+        .map(|i| [i as f32 / 128.0, 1.0 + i as f32 / 65.0, 0.0, 0.0])
+        .collect();
+    let metal = run(
+        &gpu,
+        "let lobe = lobe_metal(input.x);
+        let there = photon_lobe(photon_lobe_state(lobe | HIT_BACK), photon_lobe_light(lobe));
+        return vec4f(lobe_roughness(there), f32(lobe_kind(there)), f32(there == lobe), f32(lobe_is_specular(there)));",
+        &inputs,
+    );
+    let glass = run(
+        &gpu,
+        "let lobe = lobe_glass(input.x, input.y);
+        let texel = SurfaceTexel(1.0, vec3f(0.0, 1.0, 0.0), vec3f(0.5), SURFACE_TEXEL_BACK_FACE);
+        let on = surface_texel_on(surface_texel_scattering(texel, lobe), 65535u);
+        let there = surface_texel_lobe(surface_texel_unpack(surface_texel_pack(on)));
+        let kept = f32(surface_texel_surface(on) == 65535u && (on.flags & SURFACE_TEXEL_BACK_FACE) != 0u);
+        return vec4f(lobe_roughness(there), lobe_index_of_refraction(there), f32(lobe_kind(there)), kept);",
+        &inputs,
+    );
+    for ((input, metal), glass) in inputs.iter().zip(&metal).zip(&glass) {
+        assert!((metal[0] - input[0]).abs() <= 0.501 / 4095.0, "{input:?}: {metal:?}");
+        assert_eq!(metal[1..], [1.0, 1.0, 1.0]);
+        assert!((glass[0] - input[0]).abs() <= 0.501 / 31.0, "{input:?}: {glass:?}");
+        assert!(
+            (glass[1] - input[1].min(1.0 + 127.0 / 64.0)).abs() <= 0.501 / 64.0,
+            "{input:?}: {glass:?}"
+        );
+        assert_eq!(glass[2..], [2.0, 1.0]);
+    }
+}
+
+/// Photons of a frame, by hop, and the frame that they are in.
+fn photons(gpu: &Gpu, scene: &Scene) -> (Vec<Vec<Photon>>, UnitFrame) {
+    let settings = Settings {
+        frames: 1,
+        ..settings()
+    };
+    let mut offline = Offline::new(gpu, scene.clone(), &settings, 0, SIZE, Component::All).unwrap();
+    offline.render_frame(None).unwrap();
+    let photons = offline.renderer.photons().unwrap();
+    let records: Vec<Photon> = read_buffer_blocking(&gpu.device, &gpu.queue, photons.buffer()).unwrap();
+    let hops = records
+        .chunks(photons.count() as usize)
+        .map(<[Photon]>::to_vec)
+        .collect();
+    assert_no_errors(gpu);
+    (hops, *offline.renderer.frame().unwrap())
+}
+
+#[test]
+fn photons_leave_a_flat_mirror_by_the_law_of_reflection_and_arrive_as_densely_as_from_behind_it() {
+    let Some(gpu) = gpu() else { return };
+    // A mirror that stands upright beside a bulb, over a floor.
+    let mut scene = samples::plane();
+    for position in &mut scene.meshes[0].positions {
+        *position = position.map(|x| 0.1 * x);
+    }
+    let bulb = DVec3::new(0.0, 2.0, 0.0);
+    scene.lights = vec![Light::point(bulb, 10.0, [1.0; 3])];
+    scene.meshes.push(Mesh {
+        name: "mirror".into(),
+        positions: vec![[3.0, 0.5, -3.0], [3.0, 0.5, 3.0], [3.0, 5.0, 3.0], [3.0, 5.0, -3.0]],
+        indices: vec![0, 1, 2, 0, 2, 3],
+        ..Mesh::default()
+    });
+    scene.materials.push(mirror());
+    scene.instances.push(Instance::new(1, 1));
+    let (hops, frame) = photons(&gpu, &scene);
+    let place = |p: &Photon| frame.world_point(Vec3::from(p.position));
+    let image = DVec3::new(6.0, 2.0, 0.0);
+    let mut checked = 0;
+    for (first, second) in hops[0].iter().zip(&hops[1]) {
+        let is_on_mirror = first.state() == PhotonState::Stored && (place(first).x - 3.0).abs() < 1e-3;
+        if !is_on_mirror || second.state() != PhotonState::Stored {
+            continue;
+        }
+        checked += 1;
+        // Seen from the floor the light comes from its mirror image.
+        let way = place(second) - image;
+        assert!(way.normalize().dot((place(first) - image).normalize()) > 1.0 - 1e-6);
+        for channel in 0..3 {
+            let share = second.flux[channel] / first.flux[channel];
+            assert!((share - 0.9).abs() < 1e-3, "{share}");
+        }
+        let unit = way / frame.length_scale();
+        let density = way.normalize().y.abs() / (4.0 * std::f64::consts::PI * unit.length_squared());
+        // The footprint is kept in halves of 8 bits.
+        assert!(
+            (f64::from(second.density) / density - 1.0).abs() < 0.02,
+            "{} {density}",
+            second.density
+        );
+    }
+    println!("{checked} photons by way of the mirror");
+    assert!(checked > 500);
+}
+
+#[test]
+fn photons_that_meet_glass_keep_their_flux_and_those_through_a_plate_go_on_as_before() {
+    let Some(gpu) = gpu() else { return };
+    let mut scene = samples::plane();
+    for position in &mut scene.meshes[0].positions {
+        *position = position.map(|x| 0.1 * x);
+    }
+    scene.lights = vec![Light::point(DVec3::new(0.0, 2.0, 0.0), 10.0, [1.0; 3])];
+    let plate = |y: f32, is_up: bool| Mesh {
+        name: "plate".into(),
+        positions: vec![[-3.0, y, -3.0], [-3.0, y, 3.0], [3.0, y, 3.0], [3.0, y, -3.0]],
+        indices: if is_up {
+            vec![0, 1, 2, 0, 2, 3]
+        } else {
+            vec![0, 2, 1, 0, 3, 2]
+        },
+        ..Mesh::default()
+    };
+    scene.meshes.extend([plate(1.2, true), plate(1.0, false)]);
+    scene.materials.push(glass());
+    scene.instances.extend([Instance::new(1, 1), Instance::new(2, 1)]);
+    let (hops, frame) = photons(&gpu, &scene);
+    let height = |p: &Photon| frame.world_point(Vec3::from(p.position)).y;
+    let direction = |path: usize, hop: usize| {
+        let [a, b] = [&hops[hop - 1][path], &hops[hop][path]].map(|p| Vec3::from(p.position).as_dvec3());
+        (b - a).normalize()
+    };
+    let (mut through, mut met) = (0, 0);
+    for path in 0..hops[0].len() {
+        let stored = |hop: usize| hops[hop][path].state() == PhotonState::Stored;
+        if !stored(0) || (height(&hops[0][path]) - 1.2).abs() > 1e-3 || !stored(1) || !stored(2) {
+            continue;
+        }
+        met += 1;
+        assert_eq!(hops[0][path].flux, hops[1][path].flux);
+        if (height(&hops[1][path]) - 1.0).abs() > 1e-3 || height(&hops[2][path]).abs() > 1e-3 {
+            continue;
+        }
+        through += 1;
+        // Inside it is bent towards the normal by 1.5, outside it goes as it came.
+        let way = frame.world_point(Vec3::from(hops[0][path].position)) - DVec3::new(0.0, 2.0, 0.0);
+        let sine = |d: DVec3| d.with_y(0.0).length();
+        assert!((sine(way.normalize()) / sine(direction(path, 1)) - 1.5).abs() < 5e-3);
+        assert!(direction(path, 2).dot(way.normalize()) > 1.0 - 1e-5);
+    }
+    println!("{through} of {met} photons went through the plate");
+    // At least what Fresnel says for light from straight above, 0.92, less at grazing angles.
+    assert!(through as f64 > 0.75 * f64::from(met) && met > 1000);
+}
+
+#[test]
+fn rooms_with_a_mirror_glass_or_brass_have_as_much_light_as_the_path_tracer_finds() {
+    let Some(gpu) = gpu() else { return };
+    for material in [mirror(), glass(), brass()] {
+        let name = material.name.clone();
+        let scene = with_ball(material);
+        let part = |component| means(&offline::render(&gpu, &scene, &settings(), SIZE, component).unwrap());
+        let (all, direct, indirect) = (part(Component::All), part(Component::Direct), part(Component::Indirect));
+        assert!(
+            (direct + indirect - all).abs().max_element() < 1e-3 * all.max_element(),
+            "{name}"
+        );
+        let expected = reference(&gpu, &scene, PathComponent::Indirect, 512);
+        println!("{name}: indirect {indirect}, expected {expected}");
+        assert!(
+            (indirect / expected - 1.0).abs().max_element() < 0.03,
+            "{name}: {indirect}, {expected}"
+        );
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn nothing_is_made_or_recorded_for_specular_surfaces_where_there_are_none() {
+    let Some(gpu) = gpu() else { return };
+    let settings = Settings {
+        frames: 1,
+        ..settings()
+    };
+    let used = |scene: Scene| {
+        let mut offline = Offline::new(&gpu, scene, &settings, 0, SIZE, Component::All).unwrap();
+        offline.render_frame(None).unwrap();
+        let plan = offline.renderer.plan().unwrap();
+        let on = [Stage::PhotonGrid, Stage::SpecularPaths].map(|stage| plan.is_on(stage));
+        let memory = offline.memory_by_resource();
+        let made = ["photon_grid", "specular_paths"].map(|name| memory.iter().any(|(n, _)| *n == name));
+        (on, made)
+    };
+    assert_eq!(used(samples::cornell(0.0)), ([false; 2], [false; 2]));
+    assert_eq!(used(with_ball(mirror())), ([true; 2], [true; 2]));
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn a_flat_mirror_shows_the_room_before_it() {
+    let Some(gpu) = gpu() else { return };
+    // A pane before the back wall of the box, which is 5.592 m deep.
+    let back = 5.59;
+    let mut mirrored = samples::cornell(0.0);
+    mirrored.materials.push(Material {
+        base_color: [1.0; 3],
+        ..mirror()
+    });
+    let pane = Mesh {
+        name: "pane".into(),
+        positions: vec![[1.0, 1.0, back], [1.0, 4.0, back], [4.5, 4.0, back], [4.5, 1.0, back]],
+        indices: vec![0, 1, 2, 0, 2, 3],
+        ..Mesh::default()
+    };
+    mirrored.meshes.push(pane);
+    mirrored
+        .instances
+        .push(Instance::new(mirrored.meshes.len() - 1, mirrored.materials.len() - 1));
+    let pixels = offline::render(&gpu, &mirrored, &settings(), SIZE, Component::All).unwrap();
+    let expected = {
+        let settings = PathTracerSettings {
+            bounces: 4,
+            ..PathTracerSettings::default()
+        };
+        let mut reference = Reference::new(&gpu, mirrored, &settings, 0, SIZE).unwrap();
+        (0..512).for_each(|_| reference.render_sample(None).unwrap());
+        reference.read().unwrap().mean
+    };
+    // The middle of the image lies in the pane.
+    let middle = |image: &[[f32; 3]]| {
+        let kept: Vec<_> = (18..26)
+            .flat_map(|y| (20..28).map(move |x| y * 48 + x))
+            .map(|i: usize| image[i])
+            .collect();
+        means(&kept)
+    };
+    let (found, wanted) = (middle(&pixels), middle(&expected));
+    println!("in the mirror {found}, expected {wanted}");
+    assert!((found / wanted - 1.0).abs().max_element() < 0.05, "{found}, {wanted}");
+    assert_no_errors(&gpu);
+}
