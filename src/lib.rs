@@ -109,7 +109,7 @@
 //!
 //! # What is not modelled
 //!
-//! Every surface is Lambertian, and environments light nothing.
+//! A surface is diffuse, metal or glass, none of them at once, and environments light nothing.
 //! [`Plan::simplifications`](frame::Plan::simplifications) names what this means for a given scene.
 
 #![cfg_attr(docsrs, feature(doc_cfg))]

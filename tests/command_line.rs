@@ -137,7 +137,7 @@ fn the_plan_explains_every_stage() {
     let output = render().args(["sample:furnace", "--explain"]).output().unwrap();
     assert!(output.status.success());
     let text = String::from_utf8(output.stdout).unwrap();
-    for word in ["ImageSpaceTracer", "off", "no light", "simplified", "wall"] {
+    for word in ["BvhTracer", "off", "emissive triangle(s)", "no specular surface", "simplified"] {
         assert!(text.contains(word), "{word} in\n{text}");
     }
 }
@@ -252,7 +252,7 @@ fn images_and_statistics_are_written_whole() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
-/// A chrome plane of 4 × 4 under a lamp, seen from above.
+/// A grey plane of 4 × 4 under a lamp of some extent, seen from above.
 fn write_plane(folder: &Path) {
     let corners: [f32; 12] = [-2., -2., 0., 2., -2., 0., 2., 2., 0., -2., 2., 0.];
     let triangles: [u16; 6] = [0, 1, 2, 0, 2, 3];
@@ -262,7 +262,7 @@ fn write_plane(folder: &Path) {
     let file = json!({
         "asset": {"version": "2.0"},
         "extensionsUsed": ["KHR_lights_punctual"],
-        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 5.0}]}},
+        "extensions": {"KHR_lights_punctual": {"lights": [{"type": "point", "intensity": 5.0, "extras": {"radius": 0.1}}]}},
         "scene": 0,
         "scenes": [{"nodes": [0, 1, 2]}],
         "nodes": [
@@ -271,7 +271,7 @@ fn write_plane(folder: &Path) {
             {"translation": [0.5, 0, 1], "extensions": {"KHR_lights_punctual": {"light": 0}}},
         ],
         "cameras": [{"type": "perspective", "perspective": {"yfov": 0.9, "znear": 0.1}}],
-        "materials": [{"name": "chrome", "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.6, 0.7, 1.0]}}],
+        "materials": [{"name": "grey", "pbrMetallicRoughness": {"metallicFactor": 0.0, "baseColorFactor": [0.5, 0.6, 0.7, 1.0]}}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1, "material": 0}]}],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 4, "min": [-2, -2, 0], "max": [2, 2, 0]},
@@ -352,7 +352,7 @@ fn accuracy_measures_an_image_against_itself_as_exact() {
 
     let table = String::from_utf8(output.stdout).unwrap();
     assert!(table.contains("| plane | fast | 1 | direct | 0 |"), "{table}");
-    assert!(table.contains("metal, treated as Lambertian: chrome"), "{table}");
+    assert!(table.contains("1 light(s) with an extent: photons start at the centre"), "{table}");
     assert!(
         table.contains("SCENES TRUTH --presets fast,balanced --bounces 3"),
         "{table}"

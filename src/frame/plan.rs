@@ -2,6 +2,7 @@
 
 use super::{IndirectMethod, Settings, TracerKind};
 use crate::pass::PenumbraSearch;
+use crate::resource::MAX_DIRECT_POLYGONS;
 use crate::scene::SceneSummary;
 use std::fmt;
 
@@ -270,6 +271,12 @@ fn simplifications(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
     }
     if settings.indirect_method == IndirectMethod::FinalGather && !(specular.is_empty()) {
         notes.push(format!("gathered light does not come by way of {}", list(&specular)));
+    }
+    if summary.emissive_triangles.len() > MAX_DIRECT_POLYGONS {
+        notes.push(format!(
+            "lamps of more than {MAX_DIRECT_POLYGONS} triangles: direct light is that of rectangles ({} triangles in all)",
+            summary.emissive_triangles.len()
+        ));
     }
     if summary.environment_lights > 0 {
         notes.push("the environment lights nothing yet".to_owned());

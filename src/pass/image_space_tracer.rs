@@ -59,9 +59,9 @@ pub enum TraceMethod {
     /// False position; a hit meets the texel's plane from the front and within 1.5 texels of its middle; only maps that
     /// see the ray's origin are asked. As many fetches as the paper's, fewer false hits.
     Plane,
-    /// Every map marched in equal angles; nearest of all maps. More maps make it worse.
+    /// Every map marched in equal angles; nearest of all maps. More maps may make it worse.
     NearestMarch,
-    /// Every map walked texel by texel over its depth hierarchy; nearest of all maps. More maps make it worse.
+    /// Every map walked texel by texel over its depth hierarchy; nearest of all maps. More maps may make it worse.
     NearestWalk,
     /// Maps in order of distance, marched in equal angles; plane test. Fewest fetches: most rays end in the first or second
     /// map. Thin things are missed.

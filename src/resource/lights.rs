@@ -14,7 +14,7 @@ pub const MAX_LIGHTS: usize = 64;
 const EVEN_SHARE: f64 = 0.25;
 
 /// Direct light of a lamp of more triangles than this is that of the rectangle that stands for it.
-const MAX_DIRECT_POLYGONS: usize = 16;
+pub const MAX_DIRECT_POLYGONS: usize = 16;
 
 /// Shadow maps of flat lamps are taken from this far before them, in their extents, so that they do not see their own edges.
 const BEFORE_LAMP: f64 = 1.0 / 1024.0;

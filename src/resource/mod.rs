@@ -46,7 +46,7 @@ pub(crate) use env_maps::SURFACE_FORMAT;
 pub use g_buffer::{GBuffer, GBufferViews, NormalEncoding};
 pub use geometry::{CaptureTargets, Geometry, PrepareContext};
 pub use irradiance::{Irradiance, Subsampling};
-pub use lights::{Lights, MAX_LIGHTS};
+pub use lights::{Lights, MAX_DIRECT_POLYGONS, MAX_LIGHTS};
 pub use lost_rays::LostRays;
 pub use marked_pixels::MarkedPixels;
 pub use mesh_geometry::MeshGeometry;

@@ -13,16 +13,18 @@ pub const PHOTON_BYTES: u64 = size_of::<Photon>() as u64;
 pub struct Photon {
     /// Where the hop ended, unit frame.
     pub position: [f32; 3],
-    /// Low two bits: a [`PhotonState`]. Bit 8: the path came straight from its light. Bit 9: the tracer is not sure of the
-    /// hop. Bit 10: the hop begins here, at a light's surface, and is still to be traced; `position`, `normal` and `direction` are those of its start.
-    /// Bits 16 to 31, the same for all hops of a path, and 0 after its end: see [`EmissionCells`](super::EmissionCells); bits 16 to 23 are the
-    /// cell that it started in, bits 24 to 31 b where photons start 2^((b − 128) / 16) times as densely there as if they were
+    /// Low two bits: a [`PhotonState`]. Bits 2 to 7: bits 0 to 5 of the surface's lobe, 0 if it is diffuse. Bit 8: the path came
+    /// straight from its light. Bit 9: the tracer is not sure of the hop. Bit 10: the hop begins here, on a light's surface, and is
+    /// still to be traced; `position`, `normal` and `direction` are those of its start. Bit 11: the surface's back is hit. Bits 16
+    /// to 31, the same for all hops of a path, and 0 after its end: see [`EmissionCells`](super::EmissionCells); bits 16 to 23 are
+    /// the cell that it started in, bits 24 to 31 b where photons start 2^((b − 128) / 16) times as densely there as if they were
     /// spread evenly, 0 where they are. Others 0.
     pub state: u32,
     /// Radiant flux that the hop carried, unit frame, before the surface takes its share.
     pub flux: [f32; 3],
     /// Density of photons of this hop per unit area at its end: q(ω)·cosθ/d² (q the solid-angle pdf of its
-    /// direction), 1 / (unit-frame length)².
+    /// direction), 1 / (unit-frame length)². On metal and glass instead, in the upper and the lower 16 bits, the upper halves of the
+    /// radius of a photon's footprint and of its growth in a unit of length.
     pub density: f32,
     /// Geometric normal on the side hit, octahedral (`pack2x16snorm`).
     pub normal: u32,
@@ -30,8 +32,9 @@ pub struct Photon {
     pub direction: u32,
     /// Reflectance of the surface, 11-11-10.
     pub reflectance: u32,
-    /// Bits 0 to 15: index of the light that the path began at, environments not counted, or behind them of the lamp. Bits 16 to 31:
-    /// [`Instance::surface`](crate::scene::Instance::surface) of what was hit, 0 where it has none.
+    /// Bits 0 to 7: index of the light that the path began at, environments not counted, or behind them of the lamp. Bits 8 to 15:
+    /// bits 6 to 13 of the surface's lobe. Bits 16 to 31: [`Instance::surface`](crate::scene::Instance::surface) of what was hit, 0
+    /// where it has none.
     pub light_and_surface: u32,
 }
 
@@ -98,7 +101,7 @@ impl Photon {
 
     /// Index of the light that the path began at, environments not counted, or behind them of the lamp.
     pub fn light(&self) -> u32 {
-        self.light_and_surface & 0xffff
+        self.light_and_surface & 0xff
     }
 
     /// The surface that it arrived at; 0: none in particular.
