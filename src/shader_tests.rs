@@ -336,7 +336,7 @@ fn twins() -> Vec<Twin> {
             light, shadow_map_size, layer_count, search, search_taps, blur_taps, max_radius, range_scale,
         }),
         twin!(wgsl::COMPOSITE, "Params", composite::gpu::Params {
-            output_scale, direct_weight, indirect_weight, emission_weight, specular_weight,
+            output_scale, direct_weight, indirect_weight, emission_weight, has_specular,
         }),
         twin!(wgsl::ACCUMULATOR, "Params", accumulator::gpu::Params { history_weight, mean_weight }),
         twin!(wgsl::TONE_MAP, "Params", tone_map::gpu::Params { exposure, curve, inverse_gamma }),

@@ -12,7 +12,7 @@ macro_rules! compose {
 /// `position` is in the unit frame, `normal` the geometric one (of either sign; `surface_capture_normal(position)` takes
 /// it from derivatives), `reflectance` linear RGB in [0, 1], `eye` is
 /// [`CaptureView::eye`](crate::resource::CaptureView::eye). Declares no bindings; its functions begin with
-/// `surface_texel_`, `surface_capture_`, `octahedral_` and `reflectance_`.
+/// `surface_texel_`, `surface_capture_`, `lobe_`, `octahedral_` and `reflectance_`.
 pub const CAPTURE: &str = compose![
     "common/surface_texel.wgsl",
     "common/lobe.wgsl",
@@ -28,6 +28,7 @@ pub(crate) const MESH_GEOMETRY: &str = compose![
     "common/octahedral.wgsl",
     "common/reflectance.wgsl",
     "common/lobe.wgsl",
+    "common/hit.wgsl",
 ];
 
 pub(crate) const PHOTON_EMITTER: &str = compose![
@@ -374,6 +375,7 @@ pub(crate) const FINAL_GATHER_SUM: &str = compose![
     "pass/final_gather/map_light.wgsl",
     "common/surface_rays.wgsl",
     "common/hit.wgsl",
+    "common/lobe.wgsl",
     "common/env_map.wgsl",
     "common/surface_texel.wgsl",
     "common/g_buffer.wgsl",

@@ -137,7 +137,13 @@ fn the_plan_explains_every_stage() {
     let output = render().args(["sample:furnace", "--explain"]).output().unwrap();
     assert!(output.status.success());
     let text = String::from_utf8(output.stdout).unwrap();
-    for word in ["BvhTracer", "off", "emissive triangle(s)", "no specular surface", "simplified"] {
+    for word in [
+        "BvhTracer",
+        "off",
+        "emissive triangle(s)",
+        "no specular surface",
+        "simplified",
+    ] {
         assert!(text.contains(word), "{word} in\n{text}");
     }
 }
@@ -352,7 +358,10 @@ fn accuracy_measures_an_image_against_itself_as_exact() {
 
     let table = String::from_utf8(output.stdout).unwrap();
     assert!(table.contains("| plane | fast | 1 | direct | 0 |"), "{table}");
-    assert!(table.contains("1 light(s) with an extent: photons start at the centre"), "{table}");
+    assert!(
+        table.contains("1 light(s) with an extent: photons start at the centre"),
+        "{table}"
+    );
     assert!(
         table.contains("SCENES TRUTH --presets fast,balanced --bounces 3"),
         "{table}"

@@ -235,19 +235,19 @@ fn photons_that_meet_glass_keep_their_flux_and_those_through_a_plate_go_on_as_be
         (b - a).normalize()
     };
     let (mut through, mut met) = (0, 0);
-    for path in 0..hops[0].len() {
+    for (path, first) in hops[0].iter().enumerate() {
         let stored = |hop: usize| hops[hop][path].state() == PhotonState::Stored;
-        if !stored(0) || (height(&hops[0][path]) - 1.2).abs() > 1e-3 || !stored(1) || !stored(2) {
+        if !stored(0) || (height(first) - 1.2).abs() > 1e-3 || !stored(1) || !stored(2) {
             continue;
         }
         met += 1;
-        assert_eq!(hops[0][path].flux, hops[1][path].flux);
+        assert_eq!(first.flux, hops[1][path].flux);
         if (height(&hops[1][path]) - 1.0).abs() > 1e-3 || height(&hops[2][path]).abs() > 1e-3 {
             continue;
         }
         through += 1;
         // Inside it is bent towards the normal by 1.5, outside it goes as it came.
-        let way = frame.world_point(Vec3::from(hops[0][path].position)) - DVec3::new(0.0, 2.0, 0.0);
+        let way = frame.world_point(Vec3::from(first.position)) - DVec3::new(0.0, 2.0, 0.0);
         let sine = |d: DVec3| d.with_y(0.0).length();
         assert!((sine(way.normalize()) / sine(direction(path, 1)) - 1.5).abs() < 5e-3);
         assert!(direction(path, 2).dot(way.normalize()) > 1.0 - 1e-5);

@@ -11,7 +11,7 @@ struct Light {
     kind: u32,
     // Unit axis along which the light looks
     direction: vec3f,
-    // 1 - cos of the spot's inner half angle
+    // 1 - cos of the spot's inner half angle; area: 1 if all of it lies in one plane
     inner: f32,
     // Radiant intensity, irradiance on a perpendicular plane (directional), or mean radiance (area)
     intensity: vec3f,

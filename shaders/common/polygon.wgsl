@@ -15,8 +15,8 @@ struct Polygon {
 }
 
 const POLYGON_PI: f32 = 3.14159265;
-// Seen from further away than the square root of so many times its area a polygon is as good as a point, to a few
-// millionths, and rounding in the sum over its sides would be more than that.
+// Seen from further away than the root of this times its longest side a polygon is as good as a point, to a few hundred
+// thousandths, and rounding in the sum over its sides would be more than that.
 const POLYGON_FAR: f32 = 65536.0;
 
 // The angle between two corners as seen from the origin, times the cosine between n and the normal of the plane through both.
@@ -41,7 +41,9 @@ fn polygon_irradiance(polygon: Polygon, p: vec3f, n: vec3f) -> f32 {
     let is_triangle = polygon.corners == 3u;
     let middle = first + select(0.5, 1.0 / 3.0, is_triangle) * (polygon.u + polygon.v);
     let squared = dot(middle, middle);
-    if squared > POLYGON_FAR * polygon.area {
+    let diagonal = polygon.u - polygon.v;
+    let longest = max(dot(diagonal, diagonal), max(dot(polygon.u, polygon.u), dot(polygon.v, polygon.v)));
+    if squared > POLYGON_FAR * longest {
         let direction = middle * inverseSqrt(squared);
         let cosines = max(0.0, dot(n, direction)) * -dot(normalize(front), direction);
         return polygon.area * cosines / squared;

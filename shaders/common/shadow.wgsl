@@ -22,7 +22,8 @@ fn shadow_probe(light: Light, p: vec3f, map_size: u32) -> ShadowProbe {
     let ray = light_ray_to(light, p);
     var is_inside = all(ray.uv >= vec2f(0.0)) && all(ray.uv <= vec2f(1.0));
     // Behind a flat lamp there is no light that anything could be in the way of, but the lamp itself is seen.
-    is_inside = is_inside && (light.kind != LIGHT_AREA || dot(ray.direction, light.direction) > 0.0);
+    let is_before = light.kind != LIGHT_AREA || light.inner == 0.0 || dot(ray.direction, light.direction) > 0.0;
+    is_inside = is_inside && is_before;
     return ShadowProbe(ray, dot(p - ray.origin, ray.direction), cube_face_texel(ray.uv, map_size), is_inside);
 }
 

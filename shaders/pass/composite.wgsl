@@ -7,8 +7,8 @@ struct Params {
     direct_weight: f32,
     indirect_weight: f32,
     emission_weight: f32,
-    // 0: nothing is seen in specular surfaces
-    specular_weight: f32,
+    // 0: specular surfaces are taken for diffuse ones
+    has_specular: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -34,8 +34,8 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let indirect = textureLoad(indirect_irradiance, at, 0).rgb * params.indirect_weight;
     let emission = textureLoad(emission_texture, pixel, 0).rgb * params.emission_weight;
     var scattered = base_color.rgb * INVERSE_PI * (direct + indirect);
-    if lobe_is_specular(textureLoad(surface_texture, pixel, 0).r >> 16u) {
-        scattered = textureLoad(specular_radiance, at, 0).rgb * params.specular_weight;
+    if params.has_specular == 1u && lobe_is_specular(textureLoad(surface_texture, pixel, 0).r >> 16u) {
+        scattered = textureLoad(specular_radiance, at, 0).rgb;
     }
     return vec4f((emission + scattered) * params.output_scale, 1.0);
 }

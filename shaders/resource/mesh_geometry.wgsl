@@ -118,10 +118,13 @@ fn fragment_g_buffer(v: Vertex, @builtin(front_facing) front_facing: bool) -> GB
     let front = normalize(select(geometric, v.normal, has_normal));
     let shading = select(front, -front, has_normal && !surface.front_facing);
     let emission = select(vec3f(0.0), surface.emission, surface.front_facing);
+    // Of what is not diffuse also whether its back is seen.
+    let back = select(HIT_BACK, 0u, surface.front_facing || !lobe_is_specular(surface.lobe));
+    let scattering = surface.lobe | back;
     return GBufferTexel(
         octahedral_encode(shading),
         vec4f(surface.base_color.rgb, 1.0),
         vec4f(emission, 1.0),
-        instances[v.instance].surface | (surface.lobe << 16u),
+        instances[v.instance].surface | (scattering << 16u),
     );
 }

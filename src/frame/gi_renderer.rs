@@ -26,7 +26,9 @@ use crate::resource::{
     Geometry, Irradiance, Lights, MAX_LIGHTS, MarkedPixels, NearestOccluders, Photons, PrepareContext, Radiance,
     ShadowMaps, Visibility,
 };
-use crate::scene::{Camera, Lamp, Light, LightKind, Projection, SceneBounds, SceneSummary, UnitFrame};
+use crate::scene::{
+    Camera, EmissiveTriangle, Lamp, Light, LightKind, Projection, SceneBounds, SceneSummary, UnitFrame,
+};
 use crate::{Error, Timestamps};
 use glam::DVec3;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
@@ -42,6 +44,7 @@ pub struct GiRenderer {
     direct: Option<DirectScene>,
     indirect: Option<IndirectScene>,
     state: Option<SceneState>,
+    lamp_cache: Option<LampCache>,
     placement: EnvMapPlacement,
     /// Changes whenever a resource that views bind is made anew; no two renderers share one.
     generation: u64,
@@ -87,6 +90,17 @@ struct SceneState {
     region: SceneBounds,
     /// Of all surfaces, unit frame.
     area: f32,
+}
+
+/// Most lamps that triangles are grouped into: each has six layers of shadow maps.
+const MOST_LAMPS: usize = 16;
+
+/// What lamps were last made of.
+#[derive(Debug)]
+struct LampCache {
+    triangles: Vec<EmissiveTriangle>,
+    most: usize,
+    lamps: Vec<Lamp>,
 }
 
 /// Allocated while anything shines.
@@ -197,6 +211,7 @@ impl GiRenderer {
             direct: None,
             indirect: None,
             state: None,
+            lamp_cache: None,
             placement: EnvMapPlacement::default(),
             generation: next_generation(),
             revision: 0,
@@ -216,7 +231,8 @@ impl GiRenderer {
     /// what newly became necessary and drops what no longer is. Returns the frame for building views.
     ///
     /// # Errors
-    /// [`Error::InvalidBounds`], [`Error::InvalidScene`] for a bad light, [`Error::LimitExceeded`].
+    /// [`Error::InvalidBounds`], [`Error::InvalidScene`] for a bad light, [`Error::CountMismatch`] for too many of them,
+    /// [`Error::LimitExceeded`].
     pub fn set_scene(
         &mut self,
         queue: &wgpu::Queue,
@@ -228,11 +244,7 @@ impl GiRenderer {
             light.validate(index)?;
         }
         summary.validate(lights)?;
-        let lights_that_shine = lights.iter().filter(|l| !l.is_environment()).count();
-        let lamps = Lamp::group(
-            &summary.emissive_triangles,
-            MAX_LIGHTS.saturating_sub(lights_that_shine),
-        );
+        let lamps = self.lamps(summary, lights)?;
         let sources = Lamp::with_lights(lights, &lamps);
         let frame = match &self.state {
             Some(state) => state.frame.follow(&summary.bounds, summary.total_flux)?,
@@ -273,6 +285,38 @@ impl GiRenderer {
         }
         self.apply_centers(queue)?;
         Ok(frame)
+    }
+
+    /// As many as there is room for beside the lights, grouped anew where their triangles have changed.
+    fn lamps(&mut self, summary: &SceneSummary, lights: &[Light]) -> Result<Vec<Lamp>, Error> {
+        if summary.emissive_triangles.is_empty() {
+            self.lamp_cache = None;
+            return Ok(Vec::new());
+        }
+        let others = lights.iter().filter(|l| !l.is_environment()).count();
+        let layers = self.device.limits().max_texture_array_layers;
+        let free_layers = layers.saturating_sub(1 + ShadowMaps::layers(lights));
+        let most = MOST_LAMPS
+            .min(free_layers as usize / 6)
+            .min(MAX_LIGHTS.saturating_sub(others));
+        if most == 0 {
+            return Err(Error::CountMismatch {
+                what: "lights beside surfaces that shine (most a scene may have)",
+                expected: MAX_LIGHTS - 1,
+                found: others,
+            });
+        }
+        let is_known = |c: &LampCache| c.most == most && c.triangles == summary.emissive_triangles;
+        if let Some(cache) = self.lamp_cache.as_ref().filter(|c| is_known(c)) {
+            return Ok(cache.lamps.clone());
+        }
+        let lamps = Lamp::group(&summary.emissive_triangles, most);
+        self.lamp_cache = Some(LampCache {
+            triangles: summary.emissive_triangles.clone(),
+            most,
+            lamps: lamps.clone(),
+        });
+        Ok(lamps)
     }
 
     fn allocate(&mut self, queue: &wgpu::Queue, plan: &Plan, lights: &[Light]) -> Result<(), Error> {
@@ -355,7 +399,7 @@ impl GiRenderer {
     ///
     /// Where places are chosen by what photons reach ([`CoverageMeasure::Photons`](crate::pass::CoverageMeasure)), photons are
     /// traced for it, through maps in places chosen by area, then through better ones. Triangles are not at hand here: where the
-    /// settings trace them alone, the first hits of photons decide, and the frames that follow choose better by all of them.
+    /// settings trace them alone, the first hits of photons decide (of lamps there are none), and the frames that follow choose better by all of them.
     ///
     /// # Errors
     /// [`Error::ReadBack`], [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
@@ -390,7 +434,7 @@ impl GiRenderer {
     }
 
     /// Submits a frame of photons, in image space alone: triangles are not at hand, and where maps lose a ray there is
-    /// nothing for them to cover. Where only triangles are traced these are first hits.
+    /// nothing for them to cover. Where only triangles are traced these are first hits, and none of lamps.
     fn trace_for_selection(&mut self, queue: &wgpu::Queue, geometry: &mut dyn Geometry) -> Result<(), Error> {
         self.prepare(queue, geometry, &mut [])?;
         self.selection = None;
@@ -549,7 +593,7 @@ impl GiRenderer {
     }
 
     #[cfg(feature = "bvh")]
-    fn check_gathered_triangles(&self, inputs: &ViewInputs<'_>) -> Result<(), Error> {
+    fn check_view_triangles(&self, inputs: &ViewInputs<'_>) -> Result<(), Error> {
         let is_on = |stage| self.plan().is_some_and(|p| p.is_on(stage));
         let stage = match (is_on(Stage::FinalGather), is_on(Stage::SpecularPaths)) {
             (true, _) => "FinalGather",
@@ -658,7 +702,7 @@ impl GiRenderer {
         inputs: &ViewInputs<'_>,
     ) -> Result<(), Error> {
         #[cfg(feature = "bvh")]
-        self.check_gathered_triangles(inputs)?;
+        self.check_view_triangles(inputs)?;
         self.allocate_view(resources)?;
         let g_buffer_inputs = GBufferCaptureInputs {
             queue: inputs.queue,

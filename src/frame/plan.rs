@@ -269,12 +269,18 @@ fn simplifications(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
             list(&summary.dielectrics)
         ));
     }
-    if settings.indirect_method == IndirectMethod::FinalGather && !(specular.is_empty()) {
+    if !specular.is_empty() && !indirect(summary, settings).0 {
+        notes.push(format!(
+            "diffuse to the eye where there is no indirect light: {}",
+            list(&specular)
+        ));
+    }
+    if settings.indirect_method == IndirectMethod::FinalGather && !specular.is_empty() {
         notes.push(format!("gathered light does not come by way of {}", list(&specular)));
     }
     if summary.emissive_triangles.len() > MAX_DIRECT_POLYGONS {
         notes.push(format!(
-            "lamps of more than {MAX_DIRECT_POLYGONS} triangles: direct light is that of rectangles ({} triangles in all)",
+            "{} emissive triangles: a lamp of more than {MAX_DIRECT_POLYGONS} gives the direct light of a rectangle",
             summary.emissive_triangles.len()
         ));
     }

@@ -21,7 +21,7 @@ pub(crate) mod gpu {
         pub(crate) direct_weight: f32,
         pub(crate) indirect_weight: f32,
         pub(crate) emission_weight: f32,
-        pub(crate) specular_weight: f32,
+        pub(crate) has_specular: u32,
     }
 }
 
@@ -85,7 +85,7 @@ pub struct CompositeInputs<'a> {
     pub direct: &'a Irradiance,
     /// Light by way of other surfaces.
     pub indirect: &'a Irradiance,
-    /// Radiance of specular surfaces, unit frame; `None`: they are black.
+    /// Radiance of specular surfaces, unit frame; `None`: they are taken for diffuse ones.
     pub specular: Option<&'a Irradiance>,
     /// Written; of the format that the pass was made for.
     pub radiance: &'a Radiance,
@@ -115,7 +115,7 @@ impl Composite {
             direct_weight: inputs.settings.direct,
             indirect_weight: inputs.settings.indirect,
             emission_weight: inputs.settings.emission,
-            specular_weight: if inputs.specular.is_some() { 1.0 } else { 0.0 },
+            has_specular: u32::from(inputs.specular.is_some()),
         };
         inputs
             .queue

@@ -9,7 +9,9 @@
 //! `record_rays` and [`SpecularPaths::record`]. Cost: pixels × rounds × steps rays; where paths end, lights and the photons around,
 //! as an estimate at a pixel costs. Limits: rough surfaces, and glass that reflects or transmits by chance, are noisy with few
 //! rounds, the same every frame while `sample_offset` is; direct
-//! light where a path ends has hard shadows; what is lost, or specular after the last step, is black.
+//! light where a path ends has hard shadows; indirect light there is estimated without the boundary correction of
+//! `PhotonSplatter`, of all surfaces, and its kernels do not narrow as frames are accumulated; what is lost, or specular after the
+//! last step, is black.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::pass::{Kernel, PhotonGridResources};

@@ -1,7 +1,8 @@
 //! The energy audit: emitted = absorbed + stored and continuing + escaped + lost, hop by hop.
 //!
 //! Input: [`Photons`]. Output: five sums a hop, read back by the host. Cost: one read of the photon buffer; meant for
-//! measuring, not for every frame.
+//! measuring, not for every frame. At metal and glass "absorbed" is what their colour takes: glass that reflects takes none, and
+//! rough metal a little more.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::Photons;

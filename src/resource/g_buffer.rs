@@ -51,7 +51,8 @@ pub struct GBufferViews {
     /// what lies outside it reads as black.
     pub emission: wgpu::TextureView,
     /// The number of the surface that is seen, 1 to 65 535, and 0 for none in particular: see
-    /// [`Instance::surface`](crate::scene::Instance::surface). In the first channel; `None`: there are no numbers.
+    /// [`Instance::surface`](crate::scene::Instance::surface). In the first channel; `None`: there are no numbers. Bits 16 to 29: how
+    /// it scatters, a lobe of `shaders/common/lobe.wgsl`, 0 for diffuse; bit 30: its back is seen. Formats of 16 or 8 bits hold none.
     pub surfaces: Option<wgpu::TextureView>,
     /// The part in use (x, y, width, height), for dynamic resolution; `None`: all of it.
     pub rectangle: Option<[u32; 4]>,

@@ -19,6 +19,9 @@ pub const MAX_DIRECT_POLYGONS: usize = 16;
 /// Shadow maps of flat lamps are taken from this far before them, in their extents, so that they do not see their own edges.
 const BEFORE_LAMP: f64 = 1.0 / 1024.0;
 
+/// Cosine up to which triangles lie in one plane.
+const FLAT: f64 = 0.9999;
+
 /// Beyond this a lamp's extent is no larger: infinity times a distance of zero is no number.
 const LARGEST_EXTENT: f64 = 1e30;
 
@@ -217,6 +220,10 @@ fn add_polygons(
         so_far += triangle.flux();
         triangle_polygon(frame, triangle, so_far / flux)
     }));
+    // Nothing shines behind the plane of a flat lamp.
+    let plane = Vec3::from(record.direction).as_dvec3();
+    let is_flat = |t: &EmissiveTriangle| t.area_vector().dot(plane) >= FLAT * t.area();
+    record.inner = if triangles.iter().all(is_flat) { 1.0 } else { 0.0 };
     record.first_polygon = first as u32;
     record.polygon_count = (polygons.len() - first) as u32;
     if record.direct_polygons == 0 {

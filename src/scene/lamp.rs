@@ -23,8 +23,8 @@ pub struct EmissiveTriangle {
 /// Emissive triangles that stand together and look the same way, with the rectangle that stands for them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lamp {
-    /// A rectangle around their middle, of their area seen from the front and of their spread. Shadows are cast from its
-    /// middle. Its colour times its intensity is their mean radiance.
+    /// A rectangle before them, of their area seen from the front and of their spread, so that none of them lies before it. Shadows
+    /// are cast from its middle. Its colour times its intensity is their mean radiance.
     pub light: Light,
     /// What shines.
     pub triangles: Vec<EmissiveTriangle>,
@@ -70,7 +70,7 @@ impl EmissiveTriangle {
     }
 
     /// Half the cross product of two edges: area times the unit normal of the front.
-    fn area_vector(&self) -> DVec3 {
+    pub(crate) fn area_vector(&self) -> DVec3 {
         let [a, b, c] = self.corners;
         0.5 * (b - a).cross(c - a)
     }
@@ -91,13 +91,16 @@ impl EmissiveTriangle {
 
 impl Lamp {
     /// Groups triangles into at most `most` lamps: those that share corners and look the same way within 60° of the first are
-    /// one. While there are more lamps than that, the dimmest joins the nearest one. The same triangles give the same lamps.
+    /// one. While there are more lamps than that, the dimmest joins the nearest one. The same triangles give the same lamps; those
+    /// without area, and dark ones, are left out.
     pub fn group(triangles: &[EmissiveTriangle], most: usize) -> Vec<Self> {
+        let is_lit = |t: &EmissiveTriangle| t.flux() > 0.0 && t.flux().is_finite();
+        let triangles: Vec<_> = triangles.iter().copied().filter(is_lit).collect();
         if most == 0 {
             return Vec::new();
         }
         let mut groups: Vec<Vec<EmissiveTriangle>> = Vec::new();
-        for piece in connected(triangles) {
+        for piece in connected(&triangles) {
             // Of the lamps of this piece, the way that their first triangles look.
             let mut ways: Vec<(DVec3, usize)> = Vec::new();
             for triangle in piece {
@@ -111,14 +114,16 @@ impl Lamp {
                 groups[index].push(triangle);
             }
         }
-        let flux = |g: &Vec<EmissiveTriangle>| g.iter().map(EmissiveTriangle::flux).sum::<f64>();
+        let known = |g: &[EmissiveTriangle]| (g.iter().map(EmissiveTriangle::flux).sum::<f64>(), middle(g));
+        let mut of_groups: Vec<(f64, DVec3)> = groups.iter().map(|g| known(g)).collect();
         while groups.len() > most {
-            let dimmest = (0..groups.len()).min_by(|&a, &b| flux(&groups[a]).total_cmp(&flux(&groups[b])));
-            let joins = groups.remove(dimmest.unwrap_or(0));
-            let center = middle(&joins);
-            let distance = |g: &Vec<EmissiveTriangle>| middle(g).distance_squared(center);
-            if let Some(nearest) = groups.iter_mut().min_by(|a, b| distance(a).total_cmp(&distance(b))) {
-                nearest.extend(joins);
+            let dimmest = (0..groups.len()).min_by(|&a, &b| of_groups[a].0.total_cmp(&of_groups[b].0));
+            let dimmest = dimmest.unwrap_or(0);
+            let (joins, (_, center)) = (groups.swap_remove(dimmest), of_groups.swap_remove(dimmest));
+            let distance = |g: usize| of_groups[g].1.distance_squared(center);
+            if let Some(nearest) = (0..groups.len()).min_by(|&a, &b| distance(a).total_cmp(&distance(b))) {
+                groups[nearest].extend(joins);
+                of_groups[nearest] = known(&groups[nearest]);
             }
         }
         groups.into_iter().map(Self::of).collect()
@@ -140,6 +145,10 @@ impl Lamp {
             _ => (first.normalize_or(DVec3::Y), 0.25 * area),
         };
         let [half_u, half_v] = half_sides(&triangles, center, normal, seen);
+        // Seen from behind its own surface a lamp would stand in its own light.
+        let before = |t: &EmissiveTriangle| t.corners.map(|c| normal.dot(c - center));
+        let foremost = triangles.iter().flat_map(before).fold(0.0, f64::max);
+        let center = center + foremost * normal;
         let power: DVec3 = triangles
             .iter()
             .map(|t| t.area() * Vec3::from(t.radiance).as_dvec3())
@@ -358,6 +367,25 @@ mod tests {
         }
         let thread = [triangle([[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1e-9, 0.0]])];
         Lamp::group(&thread, 8)[0].light.validate(0).unwrap();
+    }
+
+    #[test]
+    fn no_corner_of_a_lamp_lies_before_its_rectangle_and_what_is_dark_or_has_no_area_is_left_out() {
+        let roof = [
+            panel([0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.5, 0.0]),
+            panel([1.0, 0.5, 0.0], [0.0, 0.0, 1.0], [1.0, -0.5, 0.0]),
+        ];
+        let mut all = roof.concat();
+        all.push(triangle([[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]));
+        all.push(EmissiveTriangle {
+            radiance: [0.0; 3],
+            ..triangle([[5.0; 3], [6.0, 5.0, 5.0], [5.0, 6.0, 5.0]])
+        });
+        let lamps = Lamp::group(&all, 8);
+        assert_eq!(lamps.iter().map(|l| l.triangles.len()).collect::<Vec<_>>(), [4]);
+        let (center, half_u, half_v) = rectangle(&lamps[0]);
+        assert!((half_u.cross(half_v).normalize() - DVec3::Y).length() < 1e-12);
+        assert!((center - DVec3::new(1.0, 0.5, 0.5)).length() < 1e-12, "{center}");
     }
 
     #[test]

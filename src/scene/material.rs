@@ -11,7 +11,8 @@ const DEFAULT_INDEX_OF_REFRACTION: f32 = 1.5;
 pub struct Material {
     /// Name for messages; may be empty.
     pub name: String,
-    /// Reflectance, linear RGB, each in [0, 1]. Lambertian BRDF = `base_color` / π.
+    /// Reflectance, linear RGB, each in [0, 1]: of a diffuse surface the Lambertian BRDF is `base_color` / π; of metal it is the
+    /// colour of what is reflected, of glass of what passes.
     pub base_color: [f32; 3],
     /// Multiplied with `base_color`; its alpha is opacity. Index into [`Scene::textures`](super::Scene::textures).
     pub base_color_texture: Option<usize>,

@@ -51,13 +51,14 @@ impl SceneSummary {
         if !(self.total_flux >= 0.0 && self.total_flux.is_finite()) {
             return error("total_flux", self.total_flux);
         }
-        let bad_triangle = self.emissive_triangles.iter().position(|t| !t.flux().is_finite());
+        let is_bad = |t: &EmissiveTriangle| !t.flux().is_finite() || t.radiance.iter().any(|&r| r < 0.0);
+        let bad_triangle = self.emissive_triangles.iter().position(is_bad);
         if let Some(index) = bad_triangle {
-            let problem = "has corners, or a radiance, that are not finite".to_owned();
+            let problem = "has corners or a radiance that are not finite, or a negative radiance".to_owned();
             return Err(Error::scene(
                 "summary",
                 "scene",
-                &format!("emissive_triangles[{index}]"),
+                format!("emissive_triangles[{index}]"),
                 problem,
             ));
         }

@@ -17,10 +17,11 @@ const LANES: u32 = 64u;
 var<workgroup> sums: array<vec3f, LANES>;
 
 // What a ray brings. What is lost brings nothing, as lost photons do: that rays are lost where others bring light says nothing
-// of what they would have met.
+// of what they would have met. Nor does metal or glass, where maps hold no light.
 fn brought(index: u32) -> vec3f {
     let hit = hits[index];
-    if hit.kind != HIT_SURFACE && hit.kind != HIT_TENTATIVE {
+    let is_hit = hit.kind == HIT_SURFACE || hit.kind == HIT_TENTATIVE;
+    if !is_hit || lobe_is_specular(hit.lobe) {
         return vec3f(0.0);
     }
     let ray = rays[index];

@@ -23,11 +23,9 @@ fn lamps_crossed(ray: SurfaceRay, furthest: f32) -> vec3f {
         if lights[i].kind != LIGHT_AREA {
             continue;
         }
+        // Of many triangles the rectangle that stands for them.
         let first = lights[i].first_polygon;
-        // Behind those that stand for others are the others.
-        let is_for_both = lights[i].polygon_count == lights[i].direct_polygons;
-        let from_polygon = first + select(lights[i].direct_polygons, 0u, is_for_both);
-        for (var k = from_polygon; k < first + lights[i].polygon_count; k++) {
+        for (var k = first; k < first + lights[i].direct_polygons; k++) {
             if polygon_crossed(polygons[k], ray.position, ray.direction) * SPECULAR_BEFORE < furthest {
                 sum += polygons[k].radiance;
             }
