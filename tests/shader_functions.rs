@@ -1085,10 +1085,10 @@ fn a_polygon_gives_the_light_that_all_its_points_give_together() {
     let middle = corner + 0.5 * (sides[0] + sides[1]);
     // Around the front, behind it, and up to where it counts as a point.
     let mut random = Random(31);
-    let near = (0..150).map(|_| middle + 0.3 * DVec3::NEG_Y + 1.5 * random.direction());
+    let near = (0..150).map(|_| middle + 0.5 * DVec3::Y + 1.5 * random.direction());
     let mut points: Vec<DVec3> = near.collect();
-    points.extend((0..50).map(|_| middle + 200.0 * (random.direction() - 0.5 * DVec3::Y)));
-    points.extend((0..50).map(|_| middle + 400.0 * (random.direction() - 0.5 * DVec3::Y)));
+    points.extend((0..50).map(|_| middle + 200.0 * (random.direction() + 0.5 * DVec3::Y)));
+    points.extend((0..50).map(|_| middle + 400.0 * (random.direction() + 0.5 * DVec3::Y)));
     // The normal is made of the fourth number, in the shader and here.
     let inputs: Vec<[f32; 4]> = points
         .iter()
@@ -1096,7 +1096,7 @@ fn a_polygon_gives_the_light_that_all_its_points_give_together() {
         .collect();
     for (corners, is_triangle) in [(3, true), (4, false)] {
         let body = format!(
-            "let n = normalize(vec3f(input.w, 1.0 - input.w * input.w, 0.5 * input.w + 0.25));
+            "let n = normalize(vec3f(input.w, input.w * input.w - 1.0, 0.5 * input.w + 0.25));
             let polygon = Polygon(
                 vec3f(-0.5, 1.0, -0.25), {corners}u, vec3f(0.25, 0.0, 1.0), 1.0, vec3f(1.0, 0.25, 0.0), 1.0, vec3f(1.0),
             );
@@ -1108,7 +1108,7 @@ fn a_polygon_gives_the_light_that_all_its_points_give_together() {
         let (mut worst, mut lit, mut cut) = (0.0, 0, 0);
         for (input, output) in inputs.iter().zip(&outputs) {
             let (p, w) = (vec3(*input), f64::from(input[3]));
-            let n = DVec3::new(w, 1.0 - w * w, 0.5 * w + 0.25).normalize();
+            let n = DVec3::new(w, w * w - 1.0, 0.5 * w + 0.25).normalize();
             let expected = flat_irradiance(corner, sides, is_triangle, p, n);
             let whole = sides[0].cross(sides[1]).length() / (middle - p).length_squared();
             // Against what it could be at most: near the horizon all of it goes to zero.

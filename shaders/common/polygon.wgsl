@@ -15,9 +15,9 @@ struct Polygon {
 }
 
 const POLYGON_PI: f32 = 3.14159265;
-// Seen from further away than the root of this times its longest side a polygon is as good as a point, to a few hundred
-// thousandths, and rounding in the sum over its sides would be more than that.
-const POLYGON_FAR: f32 = 65536.0;
+// Seen from further away than the root of this times its longest side a polygon is as good as a point, to a
+// ten-thousandth, and rounding in the sum over its sides would be more than that.
+const POLYGON_FAR: f32 = 4096.0;
 
 // The angle between two corners as seen from the origin, times the cosine between n and the normal of the plane through both.
 fn polygon_side(a: vec3f, b: vec3f, n: vec3f) -> f32 {
