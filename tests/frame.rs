@@ -806,27 +806,34 @@ fn maps_at_lights_stand_beside_those_selected() {
 #[test]
 fn the_energy_of_every_hop_adds_up() {
     let Some(gpu) = gpu() else { return };
-    let scene = samples::cornell(0.0);
-    let mut offline = Offline::new(&gpu, scene.clone(), &small(), 0, [8, 8], Component::All).unwrap();
-    offline.render_frame(None).unwrap();
-    let hops = offline.statistics().unwrap();
-    assert_eq!(hops.len(), 4);
-    let frame = offline.renderer.frame().unwrap();
-    let flux = scene.lights[0].flux(1.0);
-    for channel in 0..3 {
-        let emitted = f64::from(hops[0].emitted[channel]) * frame.flux_scale();
-        assert!(
-            (emitted / flux[channel] - 1.0).abs() < 1e-5,
-            "{emitted} of {}",
-            flux[channel]
-        );
-        for pair in hops.windows(2) {
-            let passed_on = pair[0].stored[channel] - pair[0].absorbed[channel];
-            let error = (pair[1].emitted[channel] / passed_on - 1.0).abs();
-            assert!(error < 1e-4, "hop: {error}");
+    let mut under_lamp = samples::cornell(0.0);
+    under_lamp.lights[0].kind = LightKind::Rectangle {
+        center: DVec3::new(2.78, 5.3, 2.795),
+        half_u: DVec3::new(0.7, 0.0, 0.0),
+        half_v: DVec3::new(0.0, 0.0, 0.5),
+    };
+    for scene in [samples::cornell(0.0), under_lamp] {
+        for tracer_kind in [TracerKind::ImageSpace, TracerKind::Hybrid, TracerKind::Bvh] {
+            let settings = Settings { tracer_kind, ..small() };
+            let mut offline = Offline::new(&gpu, scene.clone(), &settings, 0, [8, 8], Component::All).unwrap();
+            offline.render_frame(None).unwrap();
+            let hops = offline.statistics().unwrap();
+            assert_eq!(hops.len(), 4);
+            let frame = offline.renderer.frame().unwrap();
+            let flux = scene.lights[0].flux(1.0);
+            for channel in 0..3 {
+                let emitted = f64::from(hops[0].emitted[channel]) * frame.flux_scale();
+                let error = (emitted / flux[channel] - 1.0).abs();
+                assert!(error < 1e-5, "{tracer_kind:?}: {emitted} of {}", flux[channel]);
+                for pair in hops.windows(2) {
+                    let passed_on = pair[0].stored[channel] - pair[0].absorbed[channel];
+                    let error = (pair[1].emitted[channel] / passed_on - 1.0).abs();
+                    assert!(error < 1e-4, "{tracer_kind:?}, hop: {error}");
+                }
+            }
+            println!("{tracer_kind:?}: {hops:#?}");
         }
     }
-    println!("{hops:#?}");
     assert_no_errors(&gpu);
 }
 
