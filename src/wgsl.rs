@@ -339,6 +339,7 @@ pub(crate) const ENV_MAP_LIGHTING: &str = compose![
     "common/splat_surfaces.wgsl",
     "common/receiver.wgsl",
     "common/photon.wgsl",
+    "common/direct_irradiance.wgsl",
     "common/light_irradiance.wgsl",
     "common/polygon.wgsl",
     "common/is_lit.wgsl",
@@ -404,6 +405,7 @@ pub(crate) const UPSAMPLER: &str = compose![
 
 pub(crate) const DIRECT_LIGHT: &str = compose![
     "pass/direct_light.wgsl",
+    "common/direct_irradiance.wgsl",
     "common/light_irradiance.wgsl",
     "common/polygon.wgsl",
     "common/is_lit.wgsl",
@@ -509,6 +511,7 @@ pub(crate) const SPECULAR_PATHS_ADVANCE: &str = compose![
     "common/splat_surfaces.wgsl",
     "common/receiver.wgsl",
     "common/photon.wgsl",
+    "common/direct_irradiance.wgsl",
     "common/light_irradiance.wgsl",
     "common/polygon.wgsl",
     "common/is_lit.wgsl",

@@ -40,13 +40,7 @@ fn light_pixels(@builtin(global_invocation_id) id: vec3u) {
         textureStore(irradiance, id.xy, vec4f(0.0));
         return;
     }
-    var sum = vec3f(0.0);
-    for (var i = 0u; i < params.light_count; i++) {
-        let e = light_irradiance(lights[i], surface.position, surface.normal);
-        if any(e > vec3f(0.0)) && is_lit(lights[i], surface.position, surface.normal, params.shadow_map_size) {
-            sum += e;
-        }
-    }
+    let sum = direct_irradiance(surface.position, surface.normal, params.light_count, params.shadow_map_size);
     textureStore(irradiance, id.xy, vec4f(sum, 1.0));
 }
 

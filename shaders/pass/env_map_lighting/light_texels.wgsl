@@ -40,17 +40,6 @@ fn boundary_goes_on(receiver: Receiver, y: vec3f, slab: f32) -> bool {
     return boundary_says_on(receiver, y, BoundarySight(center + seen, texel.surface.normal, surface, seen), slab);
 }
 
-fn direct_light(p: vec3f, n: vec3f) -> vec3f {
-    var sum = vec3f(0.0);
-    for (var i = 0u; i < params.light_count; i++) {
-        let e = light_irradiance(lights[i], p, n);
-        if any(e > vec3f(0.0)) && is_lit(lights[i], p, n, params.shadow_map_size) {
-            sum += e;
-        }
-    }
-    return sum;
-}
-
 fn indirect_light(receiver: Receiver) -> vec3f {
     let g = grid_light(receiver);
     let sum = vec3f(g.red, g.green, g.blue);
@@ -77,5 +66,5 @@ fn light_texels(@builtin(global_invocation_id) id: vec3u) {
     let p = centers[own_map].xyz + texel.direction * texel.surface.distance;
     let n = texel.surface.normal;
     let indirect = indirect_light(Receiver(p, n, surface_texel_surface(texel.surface), true));
-    textureStore(irradiance, id.xy, id.z, vec4f(direct_light(p, n) + indirect, 1.0));
+    textureStore(irradiance, id.xy, id.z, vec4f(direct_irradiance(p, n, params.light_count, params.shadow_map_size) + indirect, 1.0));
 }

@@ -34,17 +34,6 @@ fn lamps_crossed(ray: SurfaceRay, furthest: f32) -> vec3f {
     return sum;
 }
 
-fn direct_light(p: vec3f, n: vec3f) -> vec3f {
-    var sum = vec3f(0.0);
-    for (var i = 0u; i < params.light_count; i++) {
-        let e = light_irradiance(lights[i], p, n);
-        if any(e > vec3f(0.0)) && is_lit(lights[i], p, n, params.shadow_map_size) {
-            sum += e;
-        }
-    }
-    return sum;
-}
-
 // What a path is after its ray.
 fn advanced(before: SpecularPath, index: u32, pixel: vec2u) -> SpecularPath {
     var path = before;
@@ -65,7 +54,7 @@ fn advanced(before: SpecularPath, index: u32, pixel: vec2u) -> SpecularPath {
     let lobe = hit.lobe & LOBE_BITS;
     if !lobe_is_specular(lobe) {
         let g = grid_light(Receiver(p, n, 0u, true));
-        let irradiance = direct_light(p, n) + vec3f(g.red, g.green, g.blue);
+        let irradiance = direct_irradiance(p, n, params.light_count, params.shadow_map_size) + vec3f(g.red, g.green, g.blue);
         path.radiance += params.indirect_weight * path.throughput * color * SPECULAR_INVERSE_PI * irradiance;
         return path;
     }
