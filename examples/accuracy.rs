@@ -6,7 +6,7 @@
 //!
 //! SCENES holds `NAME.glb` or `NAME.gltf`, TRUTH holds `NAME.COMPONENT.exr`; every reference whose scene is there is
 //! rendered with every preset, at the reference's size, through the file's first camera. COMPONENT is `direct`,
-//! `indirect`, `all`, or `light_traced`: all light again, by a renderer that finds caustics. The preset `reference` is the
+//! `indirect`, `caustic`, `all`, or `light_traced`: all light again, by a renderer that finds caustics. The preset `reference` is the
 //! path tracer, whose frames are samples a pixel.
 //!
 //! With `--tracers` every preset is rendered once with each of these tracers (`image-space`, `hybrid`, `bvh`) in place of
@@ -54,9 +54,10 @@ const TRACER_KIND: &str = "tracer.kind";
 const TRACERS: [&str; 3] = ["image-space", "hybrid", "bvh"];
 
 /// What a reference may hold, and what is rendered to compare with it.
-const COMPONENTS: [(&str, Component); 4] = [
+const COMPONENTS: [(&str, Component); 5] = [
     ("direct", Component::Direct),
     ("indirect", Component::Indirect),
+    ("caustic", Component::Caustic),
     ("all", Component::All),
     ("light_traced", Component::All),
 ];
@@ -83,7 +84,7 @@ struct Arguments {
     /// Only these scenes
     #[arg(long, value_delimiter = ',')]
     scenes: Vec<String>,
-    /// Only these components (direct, indirect, all, light_traced)
+    /// Only these components (direct, indirect, caustic, all, light_traced)
     #[arg(long, value_delimiter = ',')]
     components: Vec<String>,
     /// Scenes that are measured but left out of the contact sheet, because their pictures may not be passed on
@@ -512,6 +513,8 @@ fn trace_paths(gpu: &Gpu, scene: Scene, job: &Job<'_>, on_frame: &dyn Fn(u32, u3
             Component::All => PathComponent::All,
             Component::Direct => PathComponent::Direct,
             Component::Indirect => PathComponent::Indirect,
+            Component::Caustic => PathComponent::Caustic,
+            Component::Specular => PathComponent::Specular,
         },
         bounces: job.bounces,
         ..Default::default()

@@ -29,9 +29,9 @@ enum Part {
     Direct,
     /// All but direct.
     Indirect,
-    /// Light that reached a diffuse surface through metals and glass alone: for the reference preset.
+    /// Light that reached a diffuse surface through metals and glass alone.
     Caustic,
-    /// What the eye sees of metals and glass: for the reference preset.
+    /// What the eye sees of metals and glass.
     Specular,
 }
 
@@ -58,8 +58,7 @@ enum Method {
 #[derive(Parser)]
 #[command(
     args_override_self = true,
-    after_help = "Not available yet: --component caustic|specular but for --preset reference, \
-    --method surface-lights|illumination-maps, --budget-ms, glTF skins."
+    after_help = "Not available yet: --method surface-lights|illumination-maps, --budget-ms, glTF skins."
 )]
 struct Arguments {
     /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, plane, furnace, two-rooms, pillars,
@@ -342,7 +341,8 @@ fn check_available(arguments: &Arguments) -> Result<Component, String> {
         Part::All => Ok(Component::All),
         Part::Direct => Ok(Component::Direct),
         Part::Indirect => Ok(Component::Indirect),
-        Part::Caustic | Part::Specular => not_yet("--component caustic and specular, but for --preset reference,"),
+        Part::Caustic => Ok(Component::Caustic),
+        Part::Specular => Ok(Component::Specular),
     }
 }
 

@@ -12,8 +12,8 @@ use crate::pass::{
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
 use crate::resource::{
-    Photon, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, emission_cells, g_buffer, lights, lost_rays,
-    marked_pixels, mesh_geometry, view,
+    MAX_LIGHTS, Photon, PhotonMap, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, emission_cells, g_buffer, lights,
+    lost_rays, marked_pixels, mesh_geometry, photon_targets, view,
 };
 use crate::wgsl;
 #[cfg(feature = "bvh")]
@@ -249,7 +249,7 @@ fn twins() -> Vec<Twin> {
             distance, kind, normal, reflectance, fetches, maps, steps, lobe,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "WalkParams", photon_walk::gpu::WalkParams {
-            photon_count, first_hop, last_hop, roulette_from, sample_offset, row, is_shared,
+            photon_count, first_hop, last_hop, roulette_from, sample_offset, row, is_shared, map,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER_LIST, "LostRays", lost_rays::gpu::LostRays { workgroups, count, paths }),
         #[cfg(feature = "bvh")]
@@ -283,7 +283,7 @@ fn twins() -> Vec<Twin> {
         #[cfg(all(feature = "bvh", feature = "reference"))]
         twin!(wgsl::PATH_TRACER_RESOLVE, "Params", path_tracer::gpu::ResolveParams { width, output_scale }),
         twin!(wgsl::PHOTON_SPLATTER_TILED, "Bandwidth", photon_splatter::gpu::Bandwidth {
-            scale, lowest, highest, uniform_density, uniform_count, rule, max_radius, factor,
+            scale, lowest, highest, uniform, rule, min_radius, max_radius, factor,
         }),
         twin!(wgsl::PHOTON_SPLATTER_RECEIVERS, "ReceiverParams", photon_splatter::gpu::ReceiverParams { factor }),
         twin!(wgsl::PHOTON_SPLATTER_TILED, "TiledParams", tiled::gpu::TiledParams {
@@ -336,7 +336,7 @@ fn twins() -> Vec<Twin> {
             light, shadow_map_size, layer_count, search, search_taps, blur_taps, max_radius, range_scale,
         }),
         twin!(wgsl::COMPOSITE, "Params", composite::gpu::Params {
-            output_scale, direct_weight, indirect_weight, emission_weight, has_specular,
+            output_scale, direct_weight, indirect_weight, caustic_weight, emission_weight, diffuse_weight, has_specular,
         }),
         twin!(wgsl::ACCUMULATOR, "Params", accumulator::gpu::Params { history_weight, mean_weight }),
         twin!(wgsl::TONE_MAP, "Params", tone_map::gpu::Params { exposure, curve, inverse_gamma }),
@@ -353,6 +353,9 @@ fn twins() -> Vec<Twin> {
         }),
         twin!(wgsl::EMISSION_IMPORTANCE_COUNT, "Params", emission_importance::gpu::Params {
             path_count, slot_count, light_count, row, share, kept,
+        }),
+        twin!(wgsl::PHOTON_EMITTER_AT_TARGETS, "PhotonTargets", photon_targets::gpu::PhotonTargets {
+            balls, ranges, ball_count, _pad,
         }),
         twin!(wgsl::PHOTON_EMITTER, "EmissionTable", emission_cells::gpu::EmissionTable { columns, rows }),
         twin!(wgsl::TRACE_STATISTICS, "Params", trace_statistics::gpu::Params { photon_count }),
@@ -451,7 +454,8 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
     match module {
         "DepthHierarchyBuild measure" | "DepthHierarchyBuild join" => vec![&depth_hierarchy_build::SLOTS],
         "MeshGeometry" => vec![&mesh_geometry::SCENE_SLOTS, &mesh_geometry::MATERIAL_SLOTS],
-        "PhotonEmitter" => vec![&photon_emitter::SLOTS, &photon_emitter::CELL_SLOTS],
+        "PhotonEmitter" => vec![&photon_emitter::SLOTS, &photon_emitter::SPREAD_SLOTS],
+        "PhotonEmitter::at_targets" => vec![&photon_emitter::SLOTS, &photon_emitter::SPREAD_SLOTS],
         "ImageSpaceTracer" => vec![&photon_walk::SLOTS, &image_space_tracer::SLOTS],
         "ImageSpaceTracer rays" => vec![&image_space_tracer::RAY_SLOTS, &image_space_tracer::SLOTS],
         "ImageSpaceTracer list" => vec![&image_space_tracer::LIST_SLOTS],
@@ -696,6 +700,20 @@ fn photon_states_are_the_same_on_both_sides() {
         assert_eq!((first_hit.state(), first_hit.is_first_hit()), (state, true), "{name}");
     }
     assert_eq!(shader.constant("PHOTON_FIRST_HIT"), Literal::U32(Photon::FIRST_HIT));
+    let walk = Shader::new("ImageSpaceTracer", wgsl::IMAGE_SPACE_TRACER);
+    for (name, map) in [
+        ("PHOTON_MAP_ALL", PhotonMap::All),
+        ("PHOTON_MAP_GLOBAL", PhotonMap::Global),
+        ("PHOTON_MAP_CAUSTIC", PhotonMap::Caustic),
+    ] {
+        assert_eq!(walk.constant(name), Literal::U32(map as u32), "{name}");
+    }
+    let aimed = Shader::new("PhotonEmitter::at_targets", wgsl::PHOTON_EMITTER_AT_TARGETS);
+    assert_eq!(
+        aimed.constant("PHOTON_TARGETS_MOST"),
+        Literal::U32(photon_targets::MOST_TARGETS as u32)
+    );
+    assert_eq!(aimed.constant("PHOTON_TARGETS_LIGHTS"), Literal::U32(MAX_LIGHTS as u32));
     assert_eq!(shader.constant("PHOTON_TENTATIVE"), Literal::U32(Photon::TENTATIVE));
     assert_eq!(shader.constant("PHOTON_BOOST_ONE"), Literal::F32(Photon::BOOST_ONE));
     assert_eq!(shader.constant("PHOTON_BOOST_STEPS"), Literal::F32(Photon::BOOST_STEPS));

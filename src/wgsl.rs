@@ -32,9 +32,29 @@ pub(crate) const MESH_GEOMETRY: &str = compose![
 ];
 
 pub(crate) const PHOTON_EMITTER: &str = compose![
-    "pass/photon_emitter.wgsl",
+    "pass/photon_emitter/emit_photons.wgsl",
+    "pass/photon_emitter/first_hit.wgsl",
     "common/emission_cells.wgsl",
     "common/emission_grid.wgsl",
+    "common/light.wgsl",
+    "common/polygon.wgsl",
+    "common/photon.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+    "common/random.wgsl",
+    "common/halton.wgsl",
+    "common/hash.wgsl",
+    "common/lobe.wgsl",
+    "common/hit.wgsl",
+];
+
+pub(crate) const PHOTON_EMITTER_AT_TARGETS: &str = compose![
+    "pass/photon_emitter/emit_at_targets.wgsl",
+    "pass/photon_emitter/first_hit.wgsl",
+    "common/photon_targets.wgsl",
     "common/light.wgsl",
     "common/polygon.wgsl",
     "common/photon.wgsl",
@@ -607,6 +627,7 @@ pub(crate) const BVH_FUNCTIONS: &str = compose![
 pub const MODULES: &[(&str, &str)] = &[
     ("MeshGeometry", MESH_GEOMETRY),
     ("PhotonEmitter", PHOTON_EMITTER),
+    ("PhotonEmitter::at_targets", PHOTON_EMITTER_AT_TARGETS),
     ("EmissionImportance count", EMISSION_IMPORTANCE_COUNT),
     ("EmissionImportance update", EMISSION_IMPORTANCE_UPDATE),
     ("DepthHierarchyBuild measure", DEPTH_HIERARCHY_BUILD_MEASURE),

@@ -330,7 +330,7 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
         lights: &lights,
         shadow_maps: &shadow_maps,
         photons: &photons,
-        cells: None,
+        spread: PhotonSpread::Even,
         sample_offset: 0,
         timestamps,
     };

@@ -16,7 +16,12 @@ pub(crate) enum Component {
     #[default]
     All,
     Direct,
+    /// Caustics among it.
     Indirect,
+    /// On diffuse surfaces, where they have photons of their own.
+    Caustic,
+    /// What is seen in metal and glass.
+    Specular,
 }
 
 /// Frames before the first that is shown, where frames depend on those before.
@@ -59,11 +64,14 @@ impl<'a> Offline<'a> {
         renderer.set_scene(queue, &summary, &scene.lights)?;
         renderer.place_env_maps_blocking(queue, &mut geometry)?;
         let weight = |on: bool| if on { 1.0 } else { 0.0 };
+        let is_one_of = |components: &[Component]| weight(component == Component::All || components.contains(&component));
         let composite = CompositeSettings {
             output_scale: 1.0,
-            direct: weight(component != Component::Indirect),
-            emission: weight(component != Component::Indirect),
-            indirect: weight(component != Component::Direct),
+            direct: is_one_of(&[Component::Direct, Component::Specular]),
+            emission: is_one_of(&[Component::Direct]),
+            indirect: is_one_of(&[Component::Indirect, Component::Specular]),
+            caustic: is_one_of(&[Component::Indirect, Component::Caustic]),
+            diffuse: weight(component != Component::Specular),
         };
         let accumulator = if settings.frames > 1 {
             Some((Accumulator::new(device), AccumulatorResources::new(device, size)?))

@@ -5,12 +5,12 @@ struct Bandwidth {
     scale: f32,
     lowest: f32,
     highest: f32,
-    // Of one photon of a hop, per area; of all photons
-    uniform_density: f32,
-    uniform_count: f32,
+    // The uniform density, per area: of one photon of a hop, by BANDWIDTH_BIN of all photons
+    uniform: f32,
     // BANDWIDTH_...
     rule: u32,
-    // Largest radius in pixels of the G-buffer
+    // Smallest and largest radius in pixels of the G-buffer
+    min_radius: f32,
     max_radius: f32,
     // Pixels of the G-buffer for each one of the irradiance, along each axis
     factor: u32,
@@ -31,6 +31,6 @@ fn bandwidth_radius(b: Bandwidth, photon: Photon) -> f32 {
     if b.rule != BANDWIDTH_DENSITY {
         return b.scale;
     }
-    let density = clamp(photon.density / b.uniform_density, b.lowest, b.highest);
+    let density = clamp(photon.density / b.uniform, b.lowest, b.highest);
     return b.scale * inverseSqrt(density) * bandwidth_narrowing(b, photon);
 }

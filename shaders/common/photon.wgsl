@@ -15,6 +15,8 @@ const PHOTON_STARTED: u32 = 1024u;
 const PHOTON_LOBE_SHIFT: u32 = 2u;
 const PHOTON_LOBE_KIND: u32 = 12u;
 const PHOTON_BACK: u32 = 2048u;
+// It came by way of specular surfaces alone, and photons of a caustic map stand for it.
+const PHOTON_CAUSTIC: u32 = 4096u;
 // What a path keeps from its emission: bits 16 to 23 the cell that it started in, bits 24 to 31 how much more densely photons
 // start there than if they were spread evenly, 0 if they are.
 const PHOTON_EMISSION: u32 = 0xffff0000u;
@@ -86,9 +88,14 @@ fn photon_gone(state: u32, flux: vec3f, direction: vec3f, light: u32) -> Photon 
     return Photon(vec3f(0.0), state, flux, 0.0, 0u, octahedral_pack(direction), 0u, light);
 }
 
-// Whether it counts in density estimation: it arrived at a diffuse surface, and not straight from its light.
-fn photon_is_splatted(state: u32) -> bool {
+// Whether it is indirect light: it arrived at a diffuse surface, and not straight from its light.
+fn photon_is_indirect(state: u32) -> bool {
     return (state & (PHOTON_STATE_MASK | PHOTON_FIRST_HIT | PHOTON_LOBE_KIND)) == PHOTON_STORED;
+}
+
+// Whether it counts in density estimation on the screen.
+fn photon_is_splatted(state: u32) -> bool {
+    return photon_is_indirect(state) && (state & PHOTON_CAUSTIC) == 0u;
 }
 
 // Whether a surer tracer should walk the hop again.

@@ -1,12 +1,15 @@
-// Outgoing radiance: emitted + reflectance / pi * (direct + indirect irradiance), or of a specular surface what is seen in it,
-// scaled back to world units.
+// Outgoing radiance: emitted + reflectance / pi * (direct + indirect + caustic irradiance), or of a specular surface what is seen
+// in it, scaled back to world units.
 
 struct Params {
     // Radiance per unit-frame radiance, times pre-exposure
     output_scale: f32,
     direct_weight: f32,
     indirect_weight: f32,
+    // 0 where there are none apart from indirect light
+    caustic_weight: f32,
     emission_weight: f32,
+    diffuse_weight: f32,
     // 0: specular surfaces are taken for diffuse ones
     has_specular: u32,
 }
@@ -17,8 +20,9 @@ struct Params {
 @group(0) @binding(3) var emission_texture: texture_2d<f32>;
 @group(0) @binding(4) var direct_irradiance: texture_2d<f32>;
 @group(0) @binding(5) var indirect_irradiance: texture_2d<f32>;
-@group(0) @binding(6) var surface_texture: texture_2d<u32>;
-@group(0) @binding(7) var specular_radiance: texture_2d<f32>;
+@group(0) @binding(6) var caustic_irradiance: texture_2d<f32>;
+@group(0) @binding(7) var surface_texture: texture_2d<u32>;
+@group(0) @binding(8) var specular_radiance: texture_2d<f32>;
 
 const INVERSE_PI: f32 = 0.318309886;
 
@@ -32,8 +36,9 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
     }
     let direct = textureLoad(direct_irradiance, at, 0).rgb * params.direct_weight;
     let indirect = textureLoad(indirect_irradiance, at, 0).rgb * params.indirect_weight;
+    let caustic = textureLoad(caustic_irradiance, at, 0).rgb * params.caustic_weight;
     let emission = textureLoad(emission_texture, pixel, 0).rgb * params.emission_weight;
-    var scattered = base_color.rgb * INVERSE_PI * (direct + indirect);
+    var scattered = base_color.rgb * (INVERSE_PI * params.diffuse_weight) * (direct + indirect + caustic);
     if params.has_specular == 1u && lobe_is_specular(textureLoad(surface_texture, pixel, 0).r >> 16u) {
         scattered = textureLoad(specular_radiance, at, 0).rgb;
     }

@@ -5,6 +5,7 @@
 //! for, submitted or, once settled, allocated on the way. One small result comes back by itself: where environment maps
 //! should stand.
 
+use super::caustic_view::CausticView;
 use super::emission_schedule::EmissionSchedule;
 use super::env_map_placement::{EnvMapPlacement, PlacementInputs, SelectionContext};
 use super::indirect_scene::{IndirectScene, PhotonInputs, PhotonPasses};
@@ -123,6 +124,7 @@ pub struct ViewResources {
     direct: Option<(Irradiance, DirectLightResources)>,
     soft: Option<(Visibility, SoftShadowResources)>,
     indirect: Option<IndirectView>,
+    caustic: Option<CausticView>,
     specular: Option<SpecularView>,
     size: [u32; 2],
     /// Of the renderer that `direct` and `indirect` were made for.
@@ -174,10 +176,7 @@ pub struct ViewInputs<'a> {
 impl GiRenderer {
     /// Features that these settings need: none, unless they ask for quads blended in f32.
     pub fn required_features(settings: &Settings) -> wgpu::Features {
-        match settings.indirect_method {
-            IndirectMethod::Splatting => PhotonSplatter::required_features(&settings.splatter_config),
-            IndirectMethod::FinalGather => wgpu::Features::empty(),
-        }
+        PhotonSplatter::required_features(&settings.splatter_config)
     }
 
     /// Limits that suffice for any settings: the defaults. Large photon counts, and images of more than 33 million pixels, may
@@ -279,6 +278,9 @@ impl GiRenderer {
                     .lights
                     .write(queue, &frame, lights, &state.lamps, self.settings.photons)?;
             }
+            if let (Some(direct), Some(indirect)) = (&self.direct, &mut self.indirect) {
+                indirect.aim_caustics(queue, &frame, &direct.lights, &summary.specular_bounds);
+            }
             let context = selection_context(&self.device, queue, &self.settings, state);
             let is_needed = state.plan.is_on(Stage::EnvMapSelector);
             self.placement.follow(&context, is_needed)?;
@@ -351,9 +353,12 @@ impl GiRenderer {
         if !plan.is_on(Stage::PhotonEmitter) {
             self.indirect = None;
         } else if self.indirect.is_none() {
+            let config = &settings.splatter_config;
             if settings.indirect_method == IndirectMethod::Splatting {
-                let config = &settings.splatter_config;
                 PhotonSplatterResources::check(device, config, settings.photons, settings.bounces)?;
+            }
+            if plan.is_on(Stage::CausticMap) {
+                PhotonSplatterResources::check(device, config, settings.caustic.photons, settings.bounces)?;
             }
             self.generation = next_generation();
             self.photons_frame = None;
@@ -362,6 +367,7 @@ impl GiRenderer {
         }
         if let Some(indirect) = &mut self.indirect {
             indirect.sort_photons(device, plan.is_on(Stage::PhotonGrid))?;
+            indirect.split_caustics(device, settings, plan.is_on(Stage::CausticMap))?;
         }
         Ok(())
     }
@@ -427,7 +433,7 @@ impl GiRenderer {
             return Ok(());
         };
         let context = selection_context(&self.device, queue, &self.settings, state);
-        let photons = self.indirect.as_ref().filter(|_| by_photons).map(|i| &i.photons);
+        let photons = self.indirect.as_ref().filter(|_| by_photons).map(IndirectScene::photons);
         self.placement
             .select_blocking(&self.passes.env_map_selector, &context, photons, geometry)?;
         self.renew_centers(queue)
@@ -672,6 +678,7 @@ impl GiRenderer {
             direct: None,
             soft: None,
             indirect: None,
+            caustic: None,
             specular: None,
             size,
             generation: self.generation,
@@ -756,6 +763,9 @@ impl GiRenderer {
                 counts_emission: self.emission.counts(),
             };
             own.record(encoder, &indirect_inputs)?;
+            if let Some(caustic) = &mut resources.caustic {
+                caustic.record(encoder, &indirect_inputs);
+            }
             if let Some(specular) = &mut resources.specular {
                 specular.record(encoder, &indirect_inputs, &direct.shadow_maps)?;
             }
@@ -768,6 +778,7 @@ impl GiRenderer {
                 .indirect
                 .as_ref()
                 .map_or(&self.black, IndirectView::irradiance),
+            caustic: resources.caustic.as_ref().map(CausticView::irradiance),
             specular: resources.specular.as_ref().map(SpecularView::radiance),
             radiance: &resources.radiance,
             settings: inputs.composite,
@@ -783,7 +794,8 @@ impl GiRenderer {
         let (device, size) = (&self.device, view.size);
         if view.generation != self.generation {
             // Another renderer's, or from before a resource was replaced: neither fits, and both would keep it alive.
-            (view.direct, view.soft, view.indirect, view.specular) = (None, None, None, None);
+            (view.direct, view.soft, view.indirect) = (None, None, None);
+            (view.caustic, view.specular) = (None, None);
             view.generation = self.generation;
         }
         match &self.direct {
@@ -810,7 +822,14 @@ impl GiRenderer {
         match &self.indirect {
             None => view.indirect = None,
             Some(scene) if view.indirect.is_none() => {
-                view.indirect = Some(IndirectView::new(device, &self.settings, &scene.photons, size)?);
+                view.indirect = Some(IndirectView::new(device, &self.settings, scene.photons(), size)?);
+            }
+            Some(_) => {}
+        }
+        match self.indirect.as_ref().and_then(IndirectScene::caustic_photons) {
+            None => view.caustic = None,
+            Some(photons) if view.caustic.is_none() => {
+                view.caustic = Some(CausticView::new(device, &self.settings, photons, size)?);
             }
             Some(_) => {}
         }
@@ -890,7 +909,12 @@ impl GiRenderer {
 
     /// Photons, while there is indirect light.
     pub fn photons(&self) -> Option<&Photons> {
-        self.indirect.as_ref().map(|i| &i.photons)
+        self.indirect.as_ref().map(IndirectScene::photons)
+    }
+
+    /// Photons of caustics alone, while [`Stage::CausticMap`] is on.
+    pub fn caustic_photons(&self) -> Option<&Photons> {
+        self.indirect.as_ref().and_then(IndirectScene::caustic_photons)
     }
 
     /// Bytes that all views share, by resource.
@@ -947,6 +971,11 @@ impl ViewResources {
         self.indirect.iter().flat_map(IndirectView::marked_pixels)
     }
 
+    /// Irradiance of caustics, where these are apart from other indirect light.
+    pub fn caustic(&self) -> Option<&Irradiance> {
+        self.caustic.as_ref().map(CausticView::irradiance)
+    }
+
     /// Indirect irradiance, if there is any.
     pub fn indirect(&self) -> Option<&Irradiance> {
         self.indirect.as_ref().map(IndirectView::irradiance)
@@ -967,6 +996,9 @@ impl ViewResources {
         }
         if let Some(own) = &self.indirect {
             list.extend(own.memory_by_resource());
+        }
+        if let Some(own) = &self.caustic {
+            list.push(("caustic_irradiance", own.memory_use()));
         }
         if let Some(own) = &self.specular {
             list.push(("specular_paths", own.memory_use()));
@@ -1004,7 +1036,7 @@ fn traced_photons<'a>(
     indirect: &'a Option<IndirectScene>,
 ) -> Option<&'a Photons> {
     let (state, frame, indirect) = (state.as_ref()?, traced_in.as_ref()?, indirect.as_ref()?);
-    frame.maps_like(&state.frame).then_some(&indirect.photons)
+    frame.maps_like(&state.frame).then_some(indirect.photons())
 }
 
 /// Gives every view its position in the list.

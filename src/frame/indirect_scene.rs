@@ -1,19 +1,21 @@
 //! What all views share of indirect light: photons, and what the settings let them meet.
 
-use super::{IndirectMethod, SceneInputs, Settings, TracerKind};
+use super::traced_photons::{TracedPhotons, WalkInputs};
+use super::{IndirectMethod, SceneInputs, Settings};
 use crate::Error;
+#[cfg(feature = "bvh")]
+use crate::pass::BvhTracer;
 use crate::pass::{
     Bandwidth, DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EmissionImportance,
     EmissionImportanceResources, EmissionUpdateInputs, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources,
     EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources, EnvMapLightingSettings, ImageSpaceTracer,
-    ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources,
-    PhotonGrid, PhotonGridInputs, PhotonGridResources, SharedHop,
+    PhotonEmitter, PhotonGrid, PhotonGridInputs, PhotonGridResources, PhotonSpread,
 };
-#[cfg(feature = "bvh")]
-use crate::pass::{BvhTracer, BvhTracerInputs, BvhTracerResources};
 use crate::resource::{
-    CaptureView, DepthHierarchy, EmissionCells, EnvMapIrradiance, EnvMaps, Lights, LostRays, Photons, ShadowMaps,
+    CaptureView, DepthHierarchy, EmissionCells, EnvMapIrradiance, EnvMaps, Lights, PhotonMap, PhotonTargets, Photons,
+    ShadowMaps,
 };
+use crate::scene::{BoundingSphere, UnitFrame};
 
 /// From the lights to the last surface.
 #[derive(Debug)]
@@ -23,7 +25,7 @@ pub(super) struct PhotonPasses {
     depth_hierarchy_build: Option<DepthHierarchyBuild>,
     /// If the settings use it.
     pub(super) emission_importance: Option<EmissionImportance>,
-    photon_emitter: PhotonEmitter,
+    pub(super) photon_emitter: PhotonEmitter,
     /// Those that the settings use.
     pub(super) image_space_tracer: Option<ImageSpaceTracer>,
     #[cfg(feature = "bvh")]
@@ -36,15 +38,12 @@ pub(super) struct PhotonPasses {
 /// Allocated while there is indirect light.
 #[derive(Debug)]
 pub(super) struct IndirectScene {
-    pub(super) photons: Photons,
+    global: TracedPhotons,
     /// If photons start where they count.
     emission: Option<(EmissionCells, EmissionImportanceResources)>,
-    emitter: PhotonEmitterResources,
     image_space: Option<ImageSpaceScene>,
-    #[cfg(feature = "bvh")]
-    bvh_tracer: Option<BvhTracerResources>,
-    /// While one tracer traces what the other loses.
-    lost: Option<LostRays>,
+    /// While caustics have photons of their own, and what these are aimed at.
+    caustics: Option<(TracedPhotons, PhotonTargets)>,
     /// While anything specular may be seen.
     grid: Option<PhotonGridResources>,
 }
@@ -56,7 +55,6 @@ struct ImageSpaceScene {
     capture: EnvMapCaptureResources,
     /// If the method needs it.
     hierarchy: Option<(DepthHierarchy, DepthHierarchyBuildResources)>,
-    tracer: ImageSpaceTracerResources,
     /// If light is gathered.
     lighting: Option<(EnvMapIrradiance, EnvMapLightingResources)>,
 }
@@ -102,10 +100,7 @@ impl PhotonPasses {
 
 impl IndirectScene {
     pub(super) fn new(device: &wgpu::Device, queue: &wgpu::Queue, settings: &Settings) -> Result<Self, Error> {
-        let kind = settings.tracer_kind;
-        let is_shared = kind == TracerKind::Hybrid;
-        let shared_hops = if is_shared { settings.bounces } else { 0 };
-        let photons = Photons::new(device, settings.photons, settings.bounces)?;
+        let global = TracedPhotons::new(device, settings, settings.photons, PhotonMap::All)?;
         let image_space = || {
             let env_maps = EnvMaps::new(
                 device,
@@ -121,7 +116,7 @@ impl IndirectScene {
             let lighting = || {
                 Ok((
                     EnvMapIrradiance::new(device, &env_maps, settings.final_gather.map_size)?,
-                    EnvMapLightingResources::new(device, &photons)?,
+                    EnvMapLightingResources::new(device, &global.photons)?,
                 ))
             };
             let gathers = settings.indirect_method == IndirectMethod::FinalGather;
@@ -130,7 +125,6 @@ impl IndirectScene {
                 hierarchy: settings.needs_hierarchy().then(hierarchy).transpose()?,
                 env_maps,
                 capture: EnvMapCaptureResources::new(device, settings.env_map_size)?,
-                tracer: ImageSpaceTracerResources::for_shared_hops(device, shared_hops)?,
             })
         };
         let emission = || {
@@ -139,23 +133,51 @@ impl IndirectScene {
         };
         Ok(Self {
             emission: (settings.emission_importance > 0.0).then(emission).transpose()?,
-            emitter: PhotonEmitterResources::new(device)?,
             image_space: settings.needs_env_maps().then(image_space).transpose()?,
-            #[cfg(feature = "bvh")]
-            bvh_tracer: kind
-                .uses_triangles()
-                .then(|| BvhTracerResources::for_shared_hops(device, shared_hops))
-                .transpose()?,
-            lost: is_shared.then(|| LostRays::new(device, &photons)).transpose()?,
+            caustics: None,
             grid: None,
-            photons,
+            global,
         })
     }
 
     /// Forgets lights and shadow maps that are no more.
     pub(super) fn renew_emitter(&mut self, device: &wgpu::Device) -> Result<(), Error> {
-        self.emitter = PhotonEmitterResources::new(device)?;
+        if let Some((caustics, _)) = &mut self.caustics {
+            caustics.renew_emitter(device)?;
+        }
+        self.global.renew_emitter(device)
+    }
+
+    /// Gives caustics photons of their own, or none.
+    pub(super) fn split_caustics(
+        &mut self,
+        device: &wgpu::Device,
+        settings: &Settings,
+        is_wanted: bool,
+    ) -> Result<(), Error> {
+        if !is_wanted {
+            self.caustics = None;
+        } else if self.caustics.is_none() {
+            let traced = TracedPhotons::new(device, settings, settings.caustic.photons, PhotonMap::Caustic)?;
+            self.caustics = Some((traced, PhotonTargets::new(device)?));
+        }
+        let is_split = self.caustics.is_some();
+        let map = if is_split { PhotonMap::Global } else { PhotonMap::All };
+        self.global.photons.set_map(map);
         Ok(())
+    }
+
+    /// Says what caustic photons are aimed at.
+    pub(super) fn aim_caustics(
+        &mut self,
+        queue: &wgpu::Queue,
+        frame: &UnitFrame,
+        lights: &Lights,
+        targets: &[BoundingSphere],
+    ) {
+        if let Some((traced, own)) = &mut self.caustics {
+            own.write(queue, frame, lights, targets, traced.photons.count());
+        }
     }
 
     /// Keeps photons sorted, or not.
@@ -163,9 +185,18 @@ impl IndirectScene {
         if !is_wanted {
             self.grid = None;
         } else if self.grid.is_none() {
-            self.grid = Some(PhotonGridResources::new(device, &self.photons)?);
+            self.grid = Some(PhotonGridResources::new(device, &self.global.photons)?);
         }
         Ok(())
+    }
+
+    /// All but caustics, where these have photons of their own.
+    pub(super) fn photons(&self) -> &Photons {
+        &self.global.photons
+    }
+
+    pub(super) fn caustic_photons(&self) -> Option<&Photons> {
+        self.caustics.as_ref().map(|c| &c.0.photons)
     }
 
     pub(super) fn photon_grid(&self) -> Option<&PhotonGridResources> {
@@ -236,30 +267,27 @@ impl IndirectScene {
             };
             pass.record_update(encoder, own, &update_inputs);
         }
-        let emitter_inputs = PhotonEmitterInputs {
-            queue: scene.queue,
-            lights: inputs.lights,
-            shadow_maps: inputs.shadow_maps,
-            photons: &self.photons,
-            cells: self.emission.as_ref().map(|e| &e.0),
+        let env_maps = self.image_space.as_ref();
+        let mut walk_inputs = WalkInputs {
+            photons: inputs,
+            spread: match &self.emission {
+                None => PhotonSpread::Even,
+                Some((cells, _)) => PhotonSpread::Cells(cells),
+            },
+            maps: env_maps.map(|i| (&i.env_maps, i.hierarchy.as_ref().map(|h| &h.0))),
             sample_offset: scene.sample_offset,
-            timestamps: scene.timestamps,
         };
-        passes
-            .photon_emitter
-            .record(encoder, &mut self.emitter, &emitter_inputs);
-        if self.lost.is_none() {
-            self.record_walk(encoder, passes, inputs, None)?;
-        } else {
-            let first = if inputs.lights.have_area() { 0 } else { 1 };
-            let mut hops = first..=self.photons.bounces();
-            hops.try_for_each(|hop| self.record_walk(encoder, passes, inputs, Some(hop)))?;
+        self.global.record(encoder, passes, &walk_inputs)?;
+        if let Some((caustics, targets)) = &mut self.caustics {
+            walk_inputs.spread = PhotonSpread::Targets(targets);
+            walk_inputs.sample_offset = inputs.settings.caustic_offset(scene.sample_offset);
+            caustics.record(encoder, passes, &walk_inputs)?;
         }
         self.record_lighting(encoder, passes, inputs);
         if let Some(grid) = &mut self.grid {
             let grid_inputs = PhotonGridInputs {
                 queue: scene.queue,
-                photons: &self.photons,
+                photons: &self.global.photons,
                 area: inputs.area,
                 radius: inputs.radius,
                 bandwidth: inputs.settings.splatter.bandwidth,
@@ -283,7 +311,7 @@ impl IndirectScene {
             let lighting_inputs = EnvMapLightingInputs {
                 queue: inputs.scene.queue,
                 env_maps: &image_space.env_maps,
-                photons: &self.photons,
+                photons: &self.global.photons,
                 lights: inputs.lights,
                 shadow_maps: inputs.shadow_maps,
                 irradiance,
@@ -303,50 +331,10 @@ impl IndirectScene {
         }
     }
 
-    /// Of each tracer that there is, the whole walk or one hop.
-    fn record_walk(
-        &mut self,
-        encoder: &mut wgpu::CommandEncoder,
-        passes: &PhotonPasses,
-        inputs: &PhotonInputs<'_>,
-        hop: Option<u32>,
-    ) -> Result<(), Error> {
-        let scene = inputs.scene;
-        let lost = self.lost.as_ref();
-        let shared = hop.zip(lost).map(|(number, lost)| SharedHop { number, lost });
-        if let (Some(tracer), Some(image_space)) = (&passes.image_space_tracer, &mut self.image_space) {
-            let tracer_inputs = ImageSpaceTracerInputs {
-                queue: scene.queue,
-                env_maps: &image_space.env_maps,
-                hierarchy: image_space.hierarchy.as_ref().map(|h| &h.0),
-                photons: &self.photons,
-                shared,
-                sample_offset: scene.sample_offset,
-                settings: &inputs.settings.tracer,
-                timestamps: scene.timestamps,
-            };
-            tracer.record(encoder, &mut image_space.tracer, &tracer_inputs)?;
-        }
-        #[cfg(feature = "bvh")]
-        if let (Some(tracer), Some(own), Some(geometry)) = (&passes.bvh_tracer, &mut self.bvh_tracer, scene.bvh) {
-            let tracer_inputs = BvhTracerInputs {
-                queue: scene.queue,
-                geometry,
-                photons: &self.photons,
-                shared,
-                sample_offset: scene.sample_offset,
-                roulette_from: inputs.settings.tracer.roulette_from,
-                timestamps: scene.timestamps,
-            };
-            tracer.record(encoder, own, &tracer_inputs);
-        }
-        Ok(())
-    }
-
     /// Bytes by resource.
     pub(super) fn memory_by_resource(&self) -> Vec<(&'static str, u64)> {
-        let mut uniforms = self.emitter.memory_use();
-        let mut list = vec![("photons", self.photons.memory_use())];
+        let [photons, mut lost, mut uniforms] = self.global.memory_use();
+        let mut list = vec![("photons", photons)];
         if let Some((cells, own)) = &self.emission {
             list.push(("emission_cells", cells.memory_use() + own.memory_use()));
         }
@@ -359,17 +347,18 @@ impl IndirectScene {
             if let Some((irradiance, own)) = &image_space.lighting {
                 list.push(("env_map_lighting", irradiance.memory_use() + own.memory_use()));
             }
-            uniforms += image_space.tracer.memory_use();
         }
-        #[cfg(feature = "bvh")]
-        if let Some(tracer) = &self.bvh_tracer {
-            uniforms += tracer.memory_use();
+        if let Some((traced, targets)) = &self.caustics {
+            let own = traced.memory_use();
+            list.push(("caustic_photons", own[0]));
+            lost += own[1];
+            uniforms += own[2] + targets.memory_use();
         }
         if let Some(grid) = &self.grid {
             list.push(("photon_grid", grid.memory_use()));
         }
-        if let Some(lost) = &self.lost {
-            list.push(("lost_rays", lost.memory_use()));
+        if lost > 0 {
+            list.push(("lost_rays", lost));
         }
         list.push(("uniforms", uniforms));
         list

@@ -20,8 +20,7 @@ pub(super) const MOST_RAYS: u64 = 1 << 21;
 /// From photons to the pixels of a view.
 #[derive(Debug)]
 pub(super) struct ViewPasses {
-    /// If the settings splat.
-    photon_splatter: Option<PhotonSplatter>,
+    pub(super) photon_splatter: PhotonSplatter,
     /// If they gather.
     final_gather: Option<(FinalGather, IrradianceFilter)>,
     upsampler: Upsampler,
@@ -98,9 +97,8 @@ pub(super) struct IndirectViewInputs<'a> {
 impl ViewPasses {
     pub(super) fn new(device: &wgpu::Device, settings: &Settings) -> Result<Self, Error> {
         let gathers = settings.indirect_method == IndirectMethod::FinalGather;
-        let splatter = || PhotonSplatter::new(device, &settings.splatter_config);
         Ok(Self {
-            photon_splatter: (!gathers).then(splatter).transpose()?,
+            photon_splatter: PhotonSplatter::new(device, &settings.splatter_config)?,
             final_gather: gathers.then(|| (FinalGather::new(device), IrradianceFilter::new(device))),
             upsampler: Upsampler::new(device),
             specular_paths: SpecularPaths::new(
@@ -193,9 +191,7 @@ impl IndirectView {
             passes
                 .upsampler
                 .record(encoder, &mut level.upsampler, &upsampler_inputs);
-            if let (Some(marked), Estimate::Splatting(own), Some(splatter)) =
-                (&level.marked, &mut self.estimate, &passes.photon_splatter)
-            {
+            if let (Some(marked), Estimate::Splatting(own)) = (&level.marked, &mut self.estimate) {
                 let marked_inputs = MarkedSplatInputs {
                     queue: view.queue,
                     g_buffer: inputs.g_buffer,
@@ -204,7 +200,7 @@ impl IndirectView {
                     marked,
                     timestamps: view.timestamps,
                 };
-                splatter.record_marked(encoder, own, &marked_inputs);
+                passes.photon_splatter.record_marked(encoder, own, &marked_inputs);
             }
             (coarse, subsampling) = (&level.irradiance, level.subsampling);
         }
@@ -219,7 +215,7 @@ impl IndirectView {
         {
             let importance_inputs = EmissionImportanceInputs {
                 queue: inputs.view.queue,
-                photons: &inputs.scene.photons,
+                photons: inputs.scene.photons(),
                 lights: inputs.lights,
                 g_buffer: inputs.g_buffer,
                 cells,
@@ -260,7 +256,7 @@ fn splat(
     };
     let splatter_inputs = PhotonSplatterInputs {
         queue: inputs.view.queue,
-        photons: &inputs.scene.photons,
+        photons: inputs.scene.photons(),
         g_buffer: inputs.g_buffer,
         subsampling: inputs.settings.subsampling,
         irradiance: estimated,
@@ -270,9 +266,11 @@ fn splat(
         settings: &settings,
         timestamps: inputs.view.timestamps,
     };
-    if let Some(splatter) = &inputs.passes.0.photon_splatter {
-        splatter.record(encoder, own, &splatter_inputs);
-    }
+    inputs
+        .passes
+        .0
+        .photon_splatter
+        .record(encoder, own, &splatter_inputs);
 }
 
 impl GatherView {

@@ -1,6 +1,7 @@
 //! Layer 4: everything composed. [`Settings`] say how much to spend, [`Plan`] which stages a scene needs and why,
 //! [`GiRenderer`] records them in order. It uses public passes only: whatever it does, a host can do by hand.
 
+mod caustic_view;
 mod emission_schedule;
 mod env_map_placement;
 mod gi_renderer;
@@ -11,7 +12,8 @@ mod recapture;
 mod selection_schedule;
 mod settings;
 mod specular_view;
+mod traced_photons;
 
 pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};
 pub use plan::{Plan, PlannedStage, Stage};
-pub use settings::{FinalGatherSettings, IndirectMethod, Settings, TracerKind, Upsampling};
+pub use settings::{CausticSettings, FinalGatherSettings, IndirectMethod, Settings, TracerKind, Upsampling};

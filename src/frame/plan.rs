@@ -33,6 +33,8 @@ pub enum Stage {
     ImageSpaceTracer,
     /// Photons from triangle to triangle.
     BvhTracer,
+    /// Photons by way of metal and glass alone: aimed, traced and splatted by themselves.
+    CausticMap,
     /// Light on what environment maps show.
     EnvMapLighting,
     /// Photons to irradiance.
@@ -52,7 +54,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// Name as in [`pass`](crate::pass).
+    /// Name as in [`pass`](crate::pass); of a caustic map the passes are those of other photons.
     pub fn name(&self) -> String {
         format!("{self:?}")
     }
@@ -92,6 +94,7 @@ impl Plan {
             (false, _) => indirect.clone(),
             (true, false) => (true, format!("seen in or through {}", specular.join(", "))),
         };
+        let caustics = caustics(&specular, summary, settings);
         let has_extent = summary.lights_with_extent > 0 || !summary.emissive_triangles.is_empty();
         let soft = match has_extent {
             false => "no light has an extent".to_owned(),
@@ -122,6 +125,7 @@ impl Plan {
                 stage(Stage::PhotonEmitter, indirect.clone()),
                 stage(Stage::ImageSpaceTracer, image_space),
                 stage(Stage::BvhTracer, bvh),
+                stage(Stage::CausticMap, caustics),
                 stage(Stage::EnvMapLighting, gathering.clone()),
                 stage(Stage::PhotonSplatter, splatting),
                 stage(Stage::FinalGather, gathering.clone()),
@@ -244,6 +248,15 @@ fn tracers(indirect: &(bool, String), settings: &Settings) -> [(bool, String); 2
     [image_space, bvh].map(|(on, reason)| (on, reason.to_owned()))
 }
 
+fn caustics(specular: &(bool, String), summary: &SceneSummary, settings: &Settings) -> (bool, String) {
+    match (specular.0, summary.specular_bounds.len(), settings.caustic.photons) {
+        (false, _, _) => specular.clone(),
+        (true, 0, _) => (false, "the summary bounds no specular surface".to_owned()),
+        (true, _, 0) => (false, "settings give caustics no photons".to_owned()),
+        (true, things, photons) => (true, format!("{photons} photons aimed at {things} thing(s)")),
+    }
+}
+
 fn upsampling(indirect: &(bool, String), settings: &Settings) -> (bool, String) {
     let factor = settings.subsampling.factor();
     match (indirect.0, factor) {
@@ -313,7 +326,7 @@ impl fmt::Display for Plan {
 mod tests {
     use super::*;
     use crate::resource::Subsampling;
-    use crate::scene::{EmissiveTriangle, SceneBounds};
+    use crate::scene::{BoundingSphere, EmissiveTriangle, SceneBounds};
     use glam::DVec3;
 
     fn summary() -> SceneSummary {
@@ -330,6 +343,7 @@ mod tests {
             emissive: Vec::new(),
             metals: Vec::new(),
             dielectrics: Vec::new(),
+            specular_bounds: Vec::new(),
         }
     }
 
@@ -443,6 +457,28 @@ mod tests {
                 .to_string()
                 .contains("shine for the eye alone, light nothing: lamp")
         );
+    }
+
+    #[test]
+    fn caustics_get_photons_where_something_specular_can_be_aimed_at() {
+        let ball = BoundingSphere {
+            center: DVec3::ZERO,
+            radius: 1.0,
+        };
+        let on = |metals: &[&str], specular_bounds: &[BoundingSphere], photons| {
+            let summary = SceneSummary {
+                metals: metals.iter().map(|&m| m.to_owned()).collect(),
+                specular_bounds: specular_bounds.to_vec(),
+                ..summary()
+            };
+            let mut settings = Settings::balanced();
+            settings.caustic.photons = photons;
+            Plan::for_scene(&summary, &settings).is_on(Stage::CausticMap)
+        };
+        assert!(on(&["chrome"], &[ball], 10));
+        assert!(!on(&[], &[ball], 10));
+        assert!(!on(&["chrome"], &[], 10));
+        assert!(!on(&["chrome"], &[ball], 0));
     }
 
     #[test]

@@ -75,6 +75,29 @@ impl Default for FinalGatherSettings {
     }
 }
 
+/// Photons of caustics alone: of light that comes to a diffuse surface by way of metal and glass and nothing else. They are
+/// aimed at what [`SceneSummary::specular_bounds`](crate::scene::SceneSummary::specular_bounds) holds, drawn at every pixel,
+/// and are as wide as they lie apart on the screen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CausticSettings {
+    /// Photons emitted a frame, beside all others. 0: caustics are as blurred as other indirect light.
+    pub photons: u32,
+    /// Photons under a kernel, above 0. Fewer are sharper and noisier.
+    pub kernel_photons: f32,
+    /// Narrowest kernel, its radius in pixels, 0 or more: narrower ones fall between pixels, and are noise.
+    pub min_radius: f32,
+}
+
+impl Default for CausticSettings {
+    fn default() -> Self {
+        Self {
+            photons: 100_000,
+            kernel_photons: 40.0,
+            min_radius: 1.5,
+        }
+    }
+}
+
 /// How irradiance that was estimated at a part of the pixels comes to all of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Upsampling {
@@ -125,6 +148,8 @@ pub struct Settings {
     pub indirect_method: IndirectMethod,
     /// Where it is gathered.
     pub final_gather: FinalGatherSettings,
+    /// Light by way of metal and glass alone.
+    pub caustic: CausticSettings,
     /// Most specular surfaces that the eye looks through or into one behind the other, 1 to 32: a ball of glass has two. What lies
     /// behind more is black.
     pub specular_surfaces: u32,
@@ -158,6 +183,10 @@ impl Settings {
     pub fn fast() -> Self {
         Self {
             photons: 60_000,
+            caustic: CausticSettings {
+                photons: 30_000,
+                ..Default::default()
+            },
             specular_surfaces: 4,
             specular_paths: 1,
             emission_importance: 0.0,
@@ -203,6 +232,7 @@ impl Settings {
             tracer: ImageSpaceTracerSettings::default(),
             indirect_method: IndirectMethod::default(),
             final_gather: FinalGatherSettings::default(),
+            caustic: CausticSettings::default(),
             specular_surfaces: 6,
             specular_paths: 4,
             splatter_config: PhotonSplatterConfig::default(),
@@ -287,6 +317,11 @@ impl Settings {
             Some(knob) => Err(knob.error(&(knob.get)(self))),
             None => Ok(()),
         }
+    }
+
+    /// First index into the random sequence of caustic photons, as many frames on as that of all photons is.
+    pub(super) fn caustic_offset(&self, sample_offset: u32) -> u32 {
+        (u64::from(sample_offset) * u64::from(self.caustic.photons) / u64::from(self.photons.max(1))) as u32
     }
 
     /// Whether there are environment maps.
@@ -480,6 +515,20 @@ const KNOBS: &[Knob] = &[
         indirect_method,
         ["splatting", IndirectMethod::Splatting],
         ["final-gather", IndirectMethod::FinalGather]
+    ),
+    field!("caustic.photons", "0 to 100000000", caustic.photons, |v| v
+        <= 100_000_000),
+    field!(
+        "caustic.kernel_photons",
+        "above 0: photons under a kernel",
+        caustic.kernel_photons,
+        |v: f32| v > 0.0 && v.is_finite()
+    ),
+    field!(
+        "caustic.min_radius",
+        "0 to 23 pixels",
+        caustic.min_radius,
+        |v: f32| (0.0..=LARGEST_RADIUS).contains(&v)
     ),
     field!("specular.paths", "1 to 64", specular_paths, |v| (1..=64).contains(&v)),
     field!("specular.surfaces", "1 to 32", specular_surfaces, |v| (1..=32)

@@ -1,7 +1,7 @@
-//! Puts light together: L = L_e + ρ/π · (E_direct + E_indirect), or of specular surfaces what is seen in them, scaled back to
+//! Puts light together: L = L_e + ρ/π · (E_direct + E_indirect + E_caustic), or of specular surfaces what is seen in them, scaled back to
 //! world units.
 //!
-//! Inputs: [`GBuffer`], two [`Irradiance`]s, and what [`SpecularPaths`](super::SpecularPaths) gives. Output: [`Radiance`]. Cost: one full-screen pass. Source: Larsen 2004,
+//! Inputs: [`GBuffer`], two or three [`Irradiance`]s, and what [`SpecularPaths`](super::SpecularPaths) gives. Output: [`Radiance`]. Cost: one full-screen pass. Source: Larsen 2004,
 //! chapter 13; the 1/π that is missing from Yao et al., soft shadows and image-space photon mapping, Eq. 1. Limits: a
 //! surface is either Lambertian or specular.
 
@@ -20,15 +20,18 @@ pub(crate) mod gpu {
         pub(crate) output_scale: f32,
         pub(crate) direct_weight: f32,
         pub(crate) indirect_weight: f32,
+        pub(crate) caustic_weight: f32,
         pub(crate) emission_weight: f32,
+        pub(crate) diffuse_weight: f32,
         pub(crate) has_specular: u32,
     }
 }
 
 /// Bindings of `shaders/pass/composite.wgsl`, in order.
-pub(crate) const SLOTS: [Slot; 8] = [
+pub(crate) const SLOTS: [Slot; 9] = [
     Slot::Uniform,
     Slot::Uniform,
+    Slot::Texture,
     Slot::Texture,
     Slot::Texture,
     Slot::Texture,
@@ -47,8 +50,12 @@ pub struct CompositeSettings {
     pub direct: f32,
     /// Factor of indirect light.
     pub indirect: f32,
+    /// Factor of caustics, where these are apart from other indirect light.
+    pub caustic: f32,
     /// Factor of emission.
     pub emission: f32,
+    /// Factor of what diffuse surfaces reflect; 0 leaves what is seen in metal and glass.
+    pub diffuse: f32,
 }
 
 impl Default for CompositeSettings {
@@ -57,7 +64,9 @@ impl Default for CompositeSettings {
             output_scale: 1.0,
             direct: 1.0,
             indirect: 1.0,
+            caustic: 1.0,
             emission: 1.0,
+            diffuse: 1.0,
         }
     }
 }
@@ -85,6 +94,8 @@ pub struct CompositeInputs<'a> {
     pub direct: &'a Irradiance,
     /// Light by way of other surfaces.
     pub indirect: &'a Irradiance,
+    /// Light by way of specular surfaces alone; `None` where `indirect` holds it.
+    pub caustic: Option<&'a Irradiance>,
     /// Radiance of specular surfaces, unit frame; `None`: they are taken for diffuse ones.
     pub specular: Option<&'a Irradiance>,
     /// Written; of the format that the pass was made for.
@@ -114,7 +125,9 @@ impl Composite {
             output_scale: inputs.settings.output_scale,
             direct_weight: inputs.settings.direct,
             indirect_weight: inputs.settings.indirect,
+            caustic_weight: inputs.caustic.map_or(0.0, |_| inputs.settings.caustic),
             emission_weight: inputs.settings.emission,
+            diffuse_weight: inputs.settings.diffuse,
             has_specular: u32::from(inputs.specular.is_some()),
         };
         inputs
@@ -127,6 +140,7 @@ impl Composite {
             (&views.emission).into(),
             inputs.direct.view().into(),
             inputs.indirect.view().into(),
+            inputs.caustic.unwrap_or(inputs.indirect).view().into(),
             inputs.g_buffer.surfaces().into(),
             inputs.specular.unwrap_or(inputs.direct).view().into(),
         ];

@@ -1,19 +1,20 @@
 //! Emits photons from every light and stores where they first land: hop 0 of [`Photons`].
 //!
-//! Inputs: [`Lights`], [`ShadowMaps`], and [`EmissionCells`] where photons are not spread evenly. Output: [`Photons`], hop 0. Cost: proportional to the number of photons, one
-//! texel fetch each. Directions follow the Halton sequence; first hits are looked up in the light's reflective shadow map
+//! Inputs: [`Lights`], [`ShadowMaps`], and what says where photons start if they are not spread evenly ([`PhotonSpread`]).
+//! Output: [`Photons`], hop 0. Cost: proportional to the number of photons, one texel fetch each; of photons that are aimed, times
+//! the number of targets. Directions follow the Halton sequence; first hits are looked up in the light's reflective shadow map
 //! (Yao et al. 2010, section 7). Photons of flat lights start anywhere on their surfaces, and hop 0 is left to the tracer, which
 //! traces it like any other. Limits: the extent of other lights is not sampled.
 
 use super::dispatch_64;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
-use crate::resource::{EmissionCells, Lights, Photons, ShadowMaps};
+use crate::resource::{EmissionCells, Lights, PhotonTargets, Photons, ShadowMaps};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
-    /// Twin of `Params` in `shaders/pass/photon_emitter.wgsl`.
+    /// Twin of `Params` in `shaders/pass/photon_emitter/first_hit.wgsl`.
     #[derive(Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
     pub(crate) struct Params {
@@ -25,7 +26,7 @@ pub(crate) mod gpu {
     }
 }
 
-/// Bindings of `shaders/pass/photon_emitter.wgsl`, in order.
+/// Bindings of `shaders/pass/photon_emitter/first_hit.wgsl`, in order.
 pub(crate) const SLOTS: [Slot; 5] = [
     Slot::Uniform,
     Slot::Storage,
@@ -34,17 +35,30 @@ pub(crate) const SLOTS: [Slot; 5] = [
     Slot::Storage,
 ];
 
-/// Bindings of its group 1.
-pub(crate) const CELL_SLOTS: [Slot; 1] = [Slot::Storage];
+/// Bindings of group 1 of `emit_photons_by_cells`, and of `emit_photons_at_targets`.
+pub(crate) const SPREAD_SLOTS: [Slot; 1] = [Slot::Storage];
+
+/// Where photons start and in which directions.
+#[derive(Debug, Clone, Copy)]
+pub enum PhotonSpread<'a> {
+    /// As the lights shine.
+    Even,
+    /// As the lights shine, but more or less densely.
+    Cells(&'a EmissionCells),
+    /// Towards targets alone, evenly in the solid angles that these fill.
+    Targets(&'a PhotonTargets),
+}
 
 /// The pass.
 #[derive(Debug)]
 pub struct PhotonEmitter {
     device: wgpu::Device,
     layout: wgpu::BindGroupLayout,
-    cell_layout: wgpu::BindGroupLayout,
+    /// Of what spreads them.
+    spread_layout: wgpu::BindGroupLayout,
     emit: wgpu::ComputePipeline,
     emit_by_cells: wgpu::ComputePipeline,
+    emit_at_targets: wgpu::ComputePipeline,
 }
 
 /// Uniforms and bind groups.
@@ -65,8 +79,8 @@ pub struct PhotonEmitterInputs<'a> {
     pub shadow_maps: &'a ShadowMaps,
     /// Hop 0 is written.
     pub photons: &'a Photons,
-    /// How densely photons start where; `None`: evenly.
-    pub cells: Option<&'a EmissionCells>,
+    /// Where they start.
+    pub spread: PhotonSpread<'a>,
     /// First index into the random sequence: constant in real time, so that nothing flickers; advanced by the number of
     /// photons per frame when accumulating.
     pub sample_offset: u32,
@@ -79,11 +93,11 @@ impl PhotonEmitter {
     pub fn new(device: &wgpu::Device) -> Self {
         let label = "lightfall::PhotonEmitter";
         let layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &SLOTS);
-        let cell_layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &CELL_SLOTS);
-        let pipeline = |label, entry_point, layouts: &[&wgpu::BindGroupLayout]| {
+        let spread_layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &SPREAD_SLOTS);
+        let pipeline = |label, source, entry_point, layouts: &[&wgpu::BindGroupLayout]| {
             let spec = ComputeSpec {
                 label,
-                source: wgsl::PHOTON_EMITTER,
+                source,
                 entry_point,
                 layouts,
                 constants: &[],
@@ -92,14 +106,26 @@ impl PhotonEmitter {
         };
         Self {
             device: device.clone(),
-            emit: pipeline("lightfall::PhotonEmitter::emit", "emit_photons", &[&layout]),
+            emit: pipeline(
+                "lightfall::PhotonEmitter::emit",
+                wgsl::PHOTON_EMITTER,
+                "emit_photons",
+                &[&layout],
+            ),
             emit_by_cells: pipeline(
                 "lightfall::PhotonEmitter::emit_by_cells",
+                wgsl::PHOTON_EMITTER,
                 "emit_photons_by_cells",
-                &[&layout, &cell_layout],
+                &[&layout, &spread_layout],
+            ),
+            emit_at_targets: pipeline(
+                "lightfall::PhotonEmitter::emit_at_targets",
+                wgsl::PHOTON_EMITTER_AT_TARGETS,
+                "emit_photons_at_targets",
+                &[&layout, &spread_layout],
             ),
             layout,
-            cell_layout,
+            spread_layout,
         }
     }
 
@@ -130,17 +156,21 @@ impl PhotonEmitter {
         ];
         let label = "lightfall::PhotonEmitter";
         let group = resources.groups.get(&self.device, label, &self.layout, &bound);
-        let cell_group = inputs.cells.map(|cells| {
-            let bound = [cells.tables().into()];
-            resources.groups.get(&self.device, label, &self.cell_layout, &bound)
+        let (pipeline, spread) = match inputs.spread {
+            PhotonSpread::Even => (&self.emit, None),
+            PhotonSpread::Cells(cells) => (&self.emit_by_cells, Some(cells.tables())),
+            PhotonSpread::Targets(targets) => (&self.emit_at_targets, Some(targets.buffer())),
+        };
+        let spread_group = spread.map(|buffer| {
+            let bound = [buffer.into()];
+            resources
+                .groups
+                .get(&self.device, label, &self.spread_layout, &bound)
         });
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
-        match &cell_group {
-            None => pass.set_pipeline(&self.emit),
-            Some(cell_group) => {
-                pass.set_pipeline(&self.emit_by_cells);
-                pass.set_bind_group(1, cell_group, &[]);
-            }
+        pass.set_pipeline(pipeline);
+        if let Some(spread_group) = &spread_group {
+            pass.set_bind_group(1, spread_group, &[]);
         }
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(groups[0], groups[1], 1);

@@ -19,6 +19,7 @@ pub(crate) mod gpu {
         pub(crate) sample_offset: u32,
         pub(crate) row: u32,
         pub(crate) is_shared: u32,
+        pub(crate) map: u32,
     }
 }
 
@@ -102,6 +103,7 @@ impl PhotonWalk {
             sample_offset: inputs.sample_offset,
             row,
             is_shared: u32::from(inputs.shared.is_some()),
+            map: inputs.photons.map() as u32,
         };
         inputs.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&params));
         let bound = [buffer.into(), inputs.photons.buffer().into()];

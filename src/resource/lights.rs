@@ -127,7 +127,7 @@ impl Lights {
             });
         }
         let all = Lamp::with_lights(lights, lamps);
-        let counts = divide_photons(frame, &all, photon_count);
+        let counts = divide_photons(&fluxes(frame, &all), photon_count);
         let (mut records, mut polygons) = (Vec::with_capacity(found), Vec::new());
         let (mut first_layer, mut first_photon) = (0, 0);
         for (index, (light, &count)) in all.iter().zip(&counts).enumerate() {
@@ -175,6 +175,11 @@ impl Lights {
     /// Lights written.
     pub fn count(&self) -> u32 {
         self.written.len() as u32
+    }
+
+    /// As written, in the order that photons name them.
+    pub(super) fn records(&self) -> &[gpu::LightRecord] {
+        &self.written
     }
 
     /// Whether each light written has an extent, and so a penumbra.
@@ -274,13 +279,19 @@ fn polygon(
     }
 }
 
-/// Photons per light, none for an environment; sums to `total` if any other light shines. Each of them that
-/// shines gets one before the rest is divided; with fewer photons than lights the last ones get none, and their light is
-/// missing.
-fn divide_photons(frame: &UnitFrame, lights: &[Light], total: u32) -> Vec<u32> {
+/// Flux of each light over all channels, none of an environment.
+fn fluxes(frame: &UnitFrame, lights: &[Light]) -> Vec<f64> {
     let region_radius = f64::from(frame.radius()) * frame.length_scale();
-    let flux_of = |l: &Light| (!l.is_environment()).then(|| l.flux(region_radius).element_sum());
-    let flux: Vec<f64> = lights.iter().map(|l| flux_of(l).unwrap_or(0.0)).collect();
+    let flux_of = |l: &Light| match l.is_environment() {
+        true => 0.0,
+        false => l.flux(region_radius).element_sum(),
+    };
+    lights.iter().map(flux_of).collect()
+}
+
+/// Photons per light by its flux; sums to `total` if any light shines. Each of them that shines gets one before the rest is
+/// divided; with fewer photons than lights the last ones get none, and their light is missing.
+pub(super) fn divide_photons(flux: &[f64], total: u32) -> Vec<u32> {
     let all: f64 = flux.iter().sum();
     let shining = flux.iter().filter(|&&f| f > 0.0).count() as f64;
     let mut ones_left = total.min(shining as u32);
@@ -410,12 +421,12 @@ mod tests {
     #[test]
     fn photons_are_divided_by_flux_with_a_quarter_shared_evenly() {
         let light = |i| Light::point(DVec3::ZERO, i, [1.0; 3]);
-        let counts = divide_photons(&frame(), &[light(1.0), light(3.0), light(0.0)], 1000);
+        let counts = divide_photons(&fluxes(&frame(), &[light(1.0), light(3.0), light(0.0)]), 1000);
         assert_eq!(counts, [313, 687, 0]);
         assert_eq!(counts.iter().sum::<u32>(), 1000);
-        assert_eq!(divide_photons(&frame(), &[light(0.0)], 1000), [0]);
+        assert_eq!(divide_photons(&fluxes(&frame(), &[light(0.0)]), 1000), [0]);
         let one_bright_among_many: Vec<_> = (0..64).map(|i| light(if i == 0 { 1e6 } else { 1.0 })).collect();
-        let counts = divide_photons(&frame(), &one_bright_among_many, 100);
+        let counts = divide_photons(&fluxes(&frame(), &one_bright_among_many), 100);
         assert!(counts.iter().all(|&c| c >= 1), "{counts:?}");
         assert_eq!(counts.iter().sum::<u32>(), 100);
         let sky = Light {
@@ -425,7 +436,7 @@ mod tests {
             },
             ..light(1e9)
         };
-        let counts = divide_photons(&frame(), &[sky.clone(), light(1.0), sky, light(3.0)], 1000);
+        let counts = divide_photons(&fluxes(&frame(), &[sky.clone(), light(1.0), sky, light(3.0)]), 1000);
         assert_eq!(counts, [0, 313, 0, 687]);
     }
 }

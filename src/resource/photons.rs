@@ -15,7 +15,8 @@ pub struct Photon {
     pub position: [f32; 3],
     /// Low two bits: a [`PhotonState`]. Bits 2 to 7: bits 0 to 5 of the surface's lobe, 0 if it is diffuse. Bit 8: the path came
     /// straight from its light. Bit 9: the tracer is not sure of the hop. Bit 10: the hop begins here, on a light's surface, and is
-    /// still to be traced; `position`, `normal` and `direction` are those of its start. Bit 11: the surface's back is hit. Bits 16
+    /// still to be traced; `position`, `normal` and `direction` are those of its start. Bit 11: the surface's back is hit. Bit 12: it
+    /// came by way of metal and glass alone, in a [`PhotonMap::Global`]. Bits 16
     /// to 31, the same for all hops of a path, and 0 after its end: see [`EmissionCells`](super::EmissionCells); bits 16 to 23 are
     /// the cell that it started in, bits 24 to 31 b where photons start 2^((b − 128) / 16) times as densely there as if they were
     /// spread evenly, 0 where they are. Others 0.
@@ -128,6 +129,19 @@ impl Photon {
     }
 }
 
+/// Which paths a set of photons holds, after Jensen's photon maps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum PhotonMap {
+    /// All.
+    #[default]
+    All,
+    /// All; but of those that come from a light by way of metal and glass alone the first photon at a diffuse surface is not
+    /// splatted, for one of a caustic map is.
+    Global,
+    /// Those alone, as far as that photon.
+    Caustic,
+}
+
 /// Photon records of `count` paths of up to `bounces` scatterings: slot `b` × `count` + `i` is hop `b` of path `i`.
 /// Hop 0 ends at the first surface that light from the source meets.
 #[derive(Debug)]
@@ -135,6 +149,7 @@ pub struct Photons {
     buffer: wgpu::Buffer,
     count: u32,
     bounces: u32,
+    map: PhotonMap,
     bytes: u64,
 }
 
@@ -167,6 +182,7 @@ impl Photons {
             buffer,
             count,
             bounces,
+            map: PhotonMap::All,
             bytes,
         })
     }
@@ -197,6 +213,7 @@ impl Photons {
             buffer: buffer.clone(),
             count,
             bounces,
+            map: PhotonMap::All,
             bytes: 0,
         })
     }
@@ -214,6 +231,16 @@ impl Photons {
     /// Most scatterings a path may have.
     pub fn bounces(&self) -> u32 {
         self.bounces
+    }
+
+    /// Which paths the tracers walk.
+    pub fn map(&self) -> PhotonMap {
+        self.map
+    }
+
+    /// Says which paths the tracers walk from now on: at first all.
+    pub fn set_map(&mut self, map: PhotonMap) {
+        self.map = map;
     }
 
     /// Slots over all hops.

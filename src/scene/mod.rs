@@ -16,7 +16,7 @@ pub mod samples;
 mod summary;
 mod unit_frame;
 
-pub use bounds::SceneBounds;
+pub use bounds::{BoundingSphere, SceneBounds};
 pub use camera::{Camera, Projection};
 pub use environment::EnvironmentImage;
 pub use instance::Instance;

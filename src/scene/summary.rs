@@ -1,6 +1,6 @@
 //! What a scene holds, in the few numbers that decide which stages it needs.
 
-use super::{EmissiveTriangle, Light, Scene, SceneBounds};
+use super::{BoundingSphere, EmissiveTriangle, Light, Scene, SceneBounds};
 use crate::Error;
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -32,6 +32,9 @@ pub struct SceneSummary {
     pub metals: Vec<String>,
     /// Names of transmitting materials in use.
     pub dielectrics: Vec<String>,
+    /// Around each thing of metal or glass: what caustic photons are aimed at. What a host leaves out casts the caustics of
+    /// photons that happen to meet it, or none where others are aimed at.
+    pub specular_bounds: Vec<BoundingSphere>,
 }
 
 impl SceneSummary {
@@ -61,6 +64,12 @@ impl SceneSummary {
                 format!("emissive_triangles[{index}]"),
                 problem,
             ));
+        }
+        let is_bad = |b: &BoundingSphere| !(b.center.is_finite() && b.radius >= 0.0 && b.radius.is_finite());
+        if let Some(index) = self.specular_bounds.iter().position(is_bad) {
+            let problem = "has a centre or a radius that is not finite, or a negative radius".to_owned();
+            let field = format!("specular_bounds[{index}]");
+            return Err(Error::scene("summary", "scene", field, problem));
         }
         let environments = count_environments(lights);
         for (what, expected, found) in [
@@ -129,8 +138,21 @@ impl SceneSummary {
             emissive: names(super::Material::is_emissive),
             metals: names(super::Material::is_metal),
             dielectrics: names(super::Material::is_transmissive),
+            specular_bounds: specular_bounds(scene),
         })
     }
+}
+
+fn specular_bounds(scene: &Scene) -> Vec<BoundingSphere> {
+    let is_specular = |i: &&super::Instance| {
+        let material = &scene.materials[i.material];
+        material.is_metal() || material.is_transmissive()
+    };
+    let around = |instance: &super::Instance| {
+        let corners = scene.meshes[instance.mesh].positions.iter();
+        BoundingSphere::of(corners.map(|&p| instance.transform.transform_point3(Vec3::from(p).as_dvec3())))
+    };
+    scene.instances.iter().filter(is_specular).filter_map(around).collect()
 }
 
 fn count_environments(lights: &[Light]) -> usize {

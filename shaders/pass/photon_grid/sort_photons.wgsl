@@ -20,7 +20,7 @@ fn find_cells(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let photon = photons[grid.first_slot + index];
-    keys[index] = select(grid_total(), grid_index(grid_cell(photon.position)), photon_is_splatted(photon.state));
+    keys[index] = select(grid_total(), grid_index(grid_cell(photon.position)), photon_is_indirect(photon.state));
     slots[index] = index;
 }
 

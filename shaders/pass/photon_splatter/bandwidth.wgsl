@@ -27,15 +27,16 @@ fn bin_density(b: Bandwidth, photon: Photon) -> f32 {
     return f32(count) * cosine / (pixels.x * pixels.y * side * side);
 }
 
-// Radius that is wide enough on the screen; 0 behind the eye.
-fn splat_limit(b: Bandwidth, photon: Photon) -> f32 {
+// So many pixels at a photon's distance as a length; 0 behind the eye.
+fn splat_pixels(pixels: f32, photon: Photon) -> f32 {
     let w = dot(g_buffer_row(view, 3u), vec4f(photon.position, 1.0));
-    return max(0.0, b.max_radius * w / g_buffer_pixels_a_length(view));
+    return max(0.0, pixels * w / g_buffer_pixels_a_length(view));
 }
 
 // No kernel of this photon is wider.
 fn splat_widest(b: Bandwidth, photon: Photon) -> f32 {
-    return min(b.scale * inverseSqrt(b.lowest) * bandwidth_narrowing(b, photon), splat_limit(b, photon));
+    let widest = b.scale * inverseSqrt(b.lowest) * bandwidth_narrowing(b, photon);
+    return min(max(widest, splat_pixels(b.min_radius, photon)), splat_pixels(b.max_radius, photon));
 }
 
 // Radius of a photon's kernel, unit frame (Yao et al. 2010, section 6, made dimensionless by area and pdf); 0 where nothing
@@ -46,8 +47,8 @@ fn splat_radius(b: Bandwidth, photon: Photon) -> f32 {
     }
     var h = bandwidth_radius(b, photon);
     if b.rule == BANDWIDTH_BIN {
-        h *= inverseSqrt(clamp(bin_density(b, photon) / b.uniform_count, b.lowest, b.highest));
+        h *= inverseSqrt(clamp(bin_density(b, photon) / b.uniform, b.lowest, b.highest));
     }
-    h = min(h, splat_limit(b, photon));
+    h = min(max(h, splat_pixels(b.min_radius, photon)), splat_pixels(b.max_radius, photon));
     return select(0.0, h, h > 0.0);
 }

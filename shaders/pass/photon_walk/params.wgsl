@@ -12,4 +12,12 @@ struct WalkParams {
     row: u32,
     // 1: another tracer walks again what is lost or not certain
     is_shared: u32,
+    // PHOTON_MAP_...
+    map: u32,
 }
+
+// What is kept of paths: all of them; all, but what comes to a diffuse surface by way of specular ones alone is marked as the
+// business of a caustic map; only that.
+const PHOTON_MAP_ALL: u32 = 0u;
+const PHOTON_MAP_GLOBAL: u32 = 1u;
+const PHOTON_MAP_CAUSTIC: u32 = 2u;

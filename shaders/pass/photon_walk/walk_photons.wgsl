@@ -141,7 +141,8 @@ fn walk_path(index: u32) {
         let is_specular = lobe_is_specular(lobe);
         var flux = vec3f(0.0);
         var scattering: Scattering;
-        if (photon.state & PHOTON_STATE_MASK) == PHOTON_STORED {
+        let goes_on = is_specular || walk.map != PHOTON_MAP_CAUSTIC;
+        if goes_on && (photon.state & PHOTON_STATE_MASK) == PHOTON_STORED {
             var share = reflectance_unpack(photon.reflectance);
             if is_specular {
                 scattering = scatter_specular(photon, lobe, bounce, sequence_index);
@@ -155,7 +156,9 @@ fn walk_path(index: u32) {
             continue;
         }
         if is_specular {
+            let is_caustic = walk.map == PHOTON_MAP_GLOBAL && (photon.state & (PHOTON_FIRST_HIT | PHOTON_CAUSTIC)) != 0u;
             photon = next_specular(photon, flux, scattering);
+            photon.state |= select(0u, PHOTON_CAUSTIC, is_caustic);
         } else {
             photon = next_photon(photon, flux, bounce, sequence_index);
         }

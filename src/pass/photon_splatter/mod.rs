@@ -30,9 +30,9 @@ pub(crate) mod gpu {
         pub(crate) scale: f32,
         pub(crate) lowest: f32,
         pub(crate) highest: f32,
-        pub(crate) uniform_density: f32,
-        pub(crate) uniform_count: f32,
+        pub(crate) uniform: f32,
         pub(crate) rule: u32,
+        pub(crate) min_radius: f32,
         pub(crate) max_radius: f32,
         pub(crate) factor: u32,
     }
@@ -185,6 +185,9 @@ impl PhotonSplatterConfig {
 pub struct PhotonSplatterSettings {
     /// Kernel radius.
     pub bandwidth: Bandwidth,
+    /// Narrowest kernel radius in pixels of the irradiance, 0 or more, before `radius_scale`: a kernel between pixels is seen by
+    /// none of them.
+    pub min_radius: f32,
     /// Widest kernel radius in pixels of the irradiance, up to 23: bounds the cost of a photon near the eye. Where
     /// irradiance is sub-sampled, kernels may thus be wider by the factor.
     pub max_radius: f32,
@@ -204,6 +207,7 @@ impl Default for PhotonSplatterSettings {
                 photons: 700.0,
                 clamp: [0.25, 1.0],
             },
+            min_radius: 0.0,
             max_radius: LARGEST_RADIUS,
             radius_scale: 1.0,
             boundary: BoundaryCorrection::default(),
@@ -634,6 +638,7 @@ fn bandwidth(inputs: &PhotonSplatterInputs<'_>) -> gpu::Bandwidth {
     let (free, _) = free_bandwidth(settings.bandwidth, inputs.photons.count(), (inputs.area, inputs.radius));
     gpu::Bandwidth {
         scale: free.scale * settings.radius_scale,
+        min_radius: (settings.min_radius * settings.radius_scale).max(0.0) * factor as f32,
         max_radius: settings.max_radius.clamp(0.0, LARGEST_RADIUS) * factor as f32,
         factor,
         ..free
@@ -659,9 +664,9 @@ pub(super) fn free_bandwidth(bandwidth: Bandwidth, count: u32, (area, radius): (
         scale,
         lowest: clamp[0],
         highest: clamp[1],
-        uniform_density: 1.0 / area,
-        uniform_count: emitted / area,
+        uniform: if rule == 2 { emitted / area } else { 1.0 / area },
         rule,
+        min_radius: 0.0,
         max_radius: f32::MAX,
         factor: 1,
     };

@@ -1,0 +1,73 @@
+// Emits photons from every light, evenly or as tables say.
+
+@group(1) @binding(0) var<storage, read> emission_tables: array<EmissionTable>;
+
+struct Emission {
+    ray: LightRay,
+    // Per solid angle, or per perpendicular area (directional)
+    pdf: f32,
+}
+
+fn emit(light: Light, u: vec2f) -> Emission {
+    switch light.kind {
+        case LIGHT_DIRECTIONAL: {
+            let offset = light.disc_radius * sampling_disc(u);
+            return Emission(light_ray(light, light.direction, offset), light.density);
+        }
+        case LIGHT_SPOT: {
+            let local = sampling_spot(u, light.inner, light.outer);
+            let direction = mat3x3f(light.right, light.up, light.direction) * local;
+            let v = sampling_one_minus_cos(local, vec3f(0.0, 0.0, 1.0));
+            let falloff = sampling_spot_falloff(v, light.inner, light.outer);
+            return Emission(light_ray(light, normalize(direction), vec2f(0.0)), light.density * falloff);
+        }
+        default: {
+            return Emission(light_ray(light, sampling_sphere(u), vec2f(0.0)), light.density);
+        }
+    }
+}
+
+fn light_of(photon: u32) -> u32 {
+    var index = 0u;
+    while index + 1u < params.light_count && photon >= lights[index].first_photon + lights[index].photon_count {
+        index++;
+    }
+    return index;
+}
+
+// Evenly spread.
+@compute @workgroup_size(64)
+fn emit_photons(@builtin(global_invocation_id) id: vec3u) {
+    let index = id.y * params.row + id.x;
+    if id.x < params.row && index < params.photon_count {
+        emit_photon(index, EmissionStart(random_pair(params.sample_offset + index, 0u), 0u, 1.0), 0u);
+    }
+}
+
+// As the tables say.
+@compute @workgroup_size(64)
+fn emit_photons_by_cells(@builtin(global_invocation_id) id: vec3u) {
+    let index = id.y * params.row + id.x;
+    if id.x < params.row && index < params.photon_count {
+        let start = emission_start(light_of(index), random_pair(params.sample_offset + index, 0u));
+        emit_photon(index, start, photon_emission(start.cell, start.boost));
+    }
+}
+
+// `kept`: bits of the state that the path carries on.
+fn emit_photon(index: u32, start: EmissionStart, kept: u32) {
+    let light_index = light_of(index);
+    let light = lights[light_index];
+    if index < light.first_photon || index >= light.first_photon + light.photon_count {
+        photons[index] = photon_gone(PHOTON_EMPTY, vec3f(0.0), vec3f(0.0, 0.0, 1.0), 0u);
+        return;
+    }
+    if light.kind == LIGHT_AREA {
+        let place = surface_start(light, params.sample_offset + index, light.photon_count);
+        let direction = normalize(sampling_frame(place.normal) * sampling_cosine(start.u));
+        photons[index] = photon_started(place, light_index, direction, start.boost, kept);
+        return;
+    }
+    let emission = emit(light, start.u);
+    photons[index] = photon_landed(light_index, emission.ray, start.boost * emission.pdf, light.photon_flux / start.boost, kept);
+}

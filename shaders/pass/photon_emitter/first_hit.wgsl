@@ -1,0 +1,113 @@
+// Where emitted photons first land: in the light's reflective shadow map. Those of flat lights start on their surface instead,
+// and the walk traces their first hop.
+
+struct Params {
+    photon_count: u32,
+    light_count: u32,
+    sample_offset: u32,
+    shadow_map_size: u32,
+    row: u32,
+}
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> lights: array<Light>;
+@group(0) @binding(2) var shadow_maps: texture_2d_array<u32>;
+@group(0) @binding(3) var<storage, read_write> photons: array<Photon>;
+@group(0) @binding(4) var<storage, read> polygons: array<Polygon>;
+
+// A place on a flat light.
+struct SurfaceStart {
+    position: vec3f,
+    normal: vec3f,
+    // Of one photon, if directions go by the cosine
+    flux: vec3f,
+}
+
+// The first polygon of a flat light that photons start on.
+fn first_polygon(light: Light) -> u32 {
+    let is_for_both = light.polygon_count == light.direct_polygons;
+    return light.first_polygon + select(light.direct_polygons, 0u, is_for_both);
+}
+
+// The polygon whose share of the light's photons u lies in.
+fn polygon_of(light: Light, u: f32) -> u32 {
+    var low = first_polygon(light);
+    var high = light.first_polygon + light.polygon_count - 1u;
+    while low < high {
+        let middle = (low + high) / 2u;
+        if polygons[middle].until > u {
+            high = middle;
+        } else {
+            low = middle + 1u;
+        }
+    }
+    return low;
+}
+
+// On the surface of a flat light, in proportion to the flux of its polygons: two of the four numbers that such a photon is
+// made of, from an additive recurrence.
+fn surface_start(light: Light, sequence_index: u32, photon_count: u32) -> SurfaceStart {
+    let place = random_recurrence(sequence_index);
+    let index = polygon_of(light, place.x);
+    let polygon = polygons[index];
+    var before = 0.0;
+    if index > first_polygon(light) {
+        before = polygons[index - 1u].until;
+    }
+    let share = polygon.until - before;
+    var at = vec2f(clamp((place.x - before) / share, 0.0, 1.0), place.y);
+    if polygon.corners == 3u && at.x + at.y > 1.0 {
+        at = 1.0 - at;
+    }
+    return SurfaceStart(
+        polygon.corner + at.x * polygon.u + at.y * polygon.v,
+        normalize(cross(polygon.u, polygon.v)),
+        polygon.radiance * (POLYGON_PI * polygon.area / (share * f32(photon_count))),
+    );
+}
+
+// A photon there, whose first hop is still to be traced; `boost`: how much more densely photons leave this way than by the
+// cosine.
+fn photon_started(start: SurfaceStart, light_index: u32, direction: vec3f, boost: f32, kept: u32) -> Photon {
+    return Photon(
+        start.position,
+        PHOTON_EMPTY | PHOTON_STARTED | kept,
+        start.flux / boost,
+        boost,
+        octahedral_pack(start.normal),
+        octahedral_pack(direction),
+        0u,
+        light_index,
+    );
+}
+
+// Where a ray of light lands; `pdf`: of photons along it, per solid angle or per perpendicular area (directional).
+fn photon_landed(light_index: u32, ray: LightRay, pdf: f32, flux: vec3f, kept: u32) -> Photon {
+    let light = lights[light_index];
+    let at = cube_face_texel(ray.uv, params.shadow_map_size);
+    let texel = surface_texel_unpack(textureLoad(shadow_maps, at, ray.layer, 0));
+    if texel.distance <= 0.0 {
+        return photon_gone(PHOTON_ESCAPED | kept, flux, ray.direction, light_index);
+    }
+    let distance = light_texel_distance(ray, light_texel_ray(light, ray, at, params.shadow_map_size), texel);
+    let cosine = abs(dot(texel.normal, ray.direction));
+    let spread = select(1.0 / (distance * distance), 1.0, light.kind == LIGHT_DIRECTIONAL);
+    let back = select(0u, HIT_BACK, (texel.flags & SURFACE_TEXEL_BACK_FACE) != 0u);
+    let lobe = surface_texel_lobe(texel) | back;
+    var density = pdf * cosine * spread;
+    if lobe_is_specular(lobe) {
+        let radius = inverseSqrt(max(pdf * spread, 1e-20));
+        let growth = select(radius / distance, 0.0, light.kind == LIGHT_DIRECTIONAL);
+        density = photon_footprint(radius, growth);
+    }
+    return Photon(
+        ray.origin + distance * ray.direction,
+        PHOTON_STORED | PHOTON_FIRST_HIT | kept | photon_lobe_state(lobe),
+        flux,
+        density,
+        octahedral_pack(texel.normal),
+        octahedral_pack(ray.direction),
+        reflectance_pack(texel.reflectance),
+        light_index | photon_lobe_light(lobe) | (surface_texel_surface(texel) << 16u),
+    );
+}

@@ -1,0 +1,134 @@
+//! A photon map on its way from the lights to the last surface, by whichever tracers the settings choose.
+
+use super::indirect_scene::{PhotonInputs, PhotonPasses};
+use super::{Settings, TracerKind};
+use crate::Error;
+#[cfg(feature = "bvh")]
+use crate::pass::{BvhTracerInputs, BvhTracerResources};
+use crate::pass::{
+    ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitterInputs, PhotonEmitterResources, PhotonSpread,
+    SharedHop,
+};
+use crate::resource::{DepthHierarchy, EnvMaps, LostRays, PhotonMap, Photons};
+
+/// One photon map and what its walk needs of its own.
+#[derive(Debug)]
+pub(super) struct TracedPhotons {
+    pub(super) photons: Photons,
+    emitter: PhotonEmitterResources,
+    image_space: ImageSpaceTracerResources,
+    #[cfg(feature = "bvh")]
+    bvh: BvhTracerResources,
+    /// While one tracer traces what the other loses.
+    lost: Option<LostRays>,
+}
+
+/// What a walk needs beside what all share.
+#[derive(Clone, Copy)]
+pub(super) struct WalkInputs<'a> {
+    pub(super) photons: &'a PhotonInputs<'a>,
+    pub(super) spread: PhotonSpread<'a>,
+    /// While photons are traced in image space.
+    pub(super) maps: Option<(&'a EnvMaps, Option<&'a DepthHierarchy>)>,
+    /// First index into the random sequence.
+    pub(super) sample_offset: u32,
+}
+
+impl TracedPhotons {
+    pub(super) fn new(device: &wgpu::Device, settings: &Settings, count: u32, map: PhotonMap) -> Result<Self, Error> {
+        let is_shared = settings.tracer_kind == TracerKind::Hybrid;
+        let shared_hops = if is_shared { settings.bounces } else { 0 };
+        let mut photons = Photons::new(device, count, settings.bounces)?;
+        photons.set_map(map);
+        Ok(Self {
+            emitter: PhotonEmitterResources::new(device)?,
+            image_space: ImageSpaceTracerResources::for_shared_hops(device, shared_hops)?,
+            #[cfg(feature = "bvh")]
+            bvh: BvhTracerResources::for_shared_hops(device, shared_hops)?,
+            lost: is_shared.then(|| LostRays::new(device, &photons)).transpose()?,
+            photons,
+        })
+    }
+
+    /// Forgets lights and shadow maps that are no more.
+    pub(super) fn renew_emitter(&mut self, device: &wgpu::Device) -> Result<(), Error> {
+        self.emitter = PhotonEmitterResources::new(device)?;
+        Ok(())
+    }
+
+    /// Records the emission and the walk.
+    pub(super) fn record(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        passes: &PhotonPasses,
+        inputs: &WalkInputs<'_>,
+    ) -> Result<(), Error> {
+        let emitter_inputs = PhotonEmitterInputs {
+            queue: inputs.photons.scene.queue,
+            lights: inputs.photons.lights,
+            shadow_maps: inputs.photons.shadow_maps,
+            photons: &self.photons,
+            spread: inputs.spread,
+            sample_offset: inputs.sample_offset,
+            timestamps: inputs.photons.scene.timestamps,
+        };
+        passes
+            .photon_emitter
+            .record(encoder, &mut self.emitter, &emitter_inputs);
+        if self.lost.is_none() {
+            return self.record_walk(encoder, passes, inputs, None);
+        }
+        let first = if inputs.photons.lights.have_area() { 0 } else { 1 };
+        let mut hops = first..=self.photons.bounces();
+        hops.try_for_each(|hop| self.record_walk(encoder, passes, inputs, Some(hop)))
+    }
+
+    /// Of each tracer that there is, the whole walk or one hop.
+    fn record_walk(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        passes: &PhotonPasses,
+        inputs: &WalkInputs<'_>,
+        hop: Option<u32>,
+    ) -> Result<(), Error> {
+        let (scene, settings) = (inputs.photons.scene, inputs.photons.settings);
+        let lost = self.lost.as_ref();
+        let shared = hop.zip(lost).map(|(number, lost)| SharedHop { number, lost });
+        if let (Some(tracer), Some((env_maps, hierarchy))) = (&passes.image_space_tracer, inputs.maps) {
+            let tracer_inputs = ImageSpaceTracerInputs {
+                queue: scene.queue,
+                env_maps,
+                hierarchy,
+                photons: &self.photons,
+                shared,
+                sample_offset: inputs.sample_offset,
+                settings: &settings.tracer,
+                timestamps: scene.timestamps,
+            };
+            tracer.record(encoder, &mut self.image_space, &tracer_inputs)?;
+        }
+        #[cfg(feature = "bvh")]
+        if let (Some(tracer), Some(geometry)) = (&passes.bvh_tracer, scene.bvh) {
+            let tracer_inputs = BvhTracerInputs {
+                queue: scene.queue,
+                geometry,
+                photons: &self.photons,
+                shared,
+                sample_offset: inputs.sample_offset,
+                roulette_from: settings.tracer.roulette_from,
+                timestamps: scene.timestamps,
+            };
+            tracer.record(encoder, &mut self.bvh, &tracer_inputs);
+        }
+        Ok(())
+    }
+
+    /// Bytes of the photons, of the lists of those that were lost, of all else.
+    pub(super) fn memory_use(&self) -> [u64; 3] {
+        let uniforms = self.emitter.memory_use() + self.image_space.memory_use();
+        #[cfg(feature = "bvh")]
+        let uniforms = uniforms + self.bvh.memory_use();
+        let lost = self.lost.as_ref().map_or(0, LostRays::memory_use);
+        [self.photons.memory_use(), lost, uniforms]
+    }
+}
