@@ -12,8 +12,8 @@ use crate::pass::{
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
 use crate::resource::{
-    MAX_LIGHTS, Photon, PhotonMap, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, emission_cells, g_buffer, lights,
-    lost_rays, marked_pixels, mesh_geometry, photon_targets, view,
+    MAX_LIGHTS, Photon, PhotonMap, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, emission_cells, g_buffer,
+    lights, lost_rays, marked_pixels, mesh_geometry, photon_targets, view,
 };
 use crate::wgsl;
 #[cfg(feature = "bvh")]
@@ -238,7 +238,7 @@ fn twins() -> Vec<Twin> {
             base_color, alpha_cutoff, emission, metallic, roughness, transmission, index_of_refraction, _pad,
         }),
         twin!(wgsl::PHOTON_EMITTER, "Params", photon_emitter::gpu::Params {
-            photon_count, light_count, sample_offset, shadow_map_size, row,
+            photon_count, light_count, sample_offset, shadow_map_size, row, traces_first,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "Params", image_space_tracer::gpu::Params {
             map_count, map_size, iterations, epsilon, most_fetches, doubts_normals,

@@ -10,7 +10,7 @@ macro_rules! compose {
 /// front_facing))` to an `rgba32uint` target.
 ///
 /// `position` is in the unit frame, `normal` the geometric one (of either sign; `surface_capture_normal(position)` takes
-/// it from derivatives), `reflectance` linear RGB in [0, 1], `eye` is
+/// it from derivatives), of metal and glass the interpolated one, `reflectance` linear RGB in [0, 1], `eye` is
 /// [`CaptureView::eye`](crate::resource::CaptureView::eye). Declares no bindings; its functions begin with
 /// `surface_texel_`, `surface_capture_`, `lobe_`, `octahedral_` and `reflectance_`.
 pub const CAPTURE: &str = compose![

@@ -331,6 +331,7 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
         shadow_maps: &shadow_maps,
         photons: &photons,
         spread: PhotonSpread::Even,
+        first_hits: FirstHits::ShadowMaps,
         sample_offset: 0,
         timestamps,
     };

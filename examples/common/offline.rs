@@ -64,7 +64,8 @@ impl<'a> Offline<'a> {
         renderer.set_scene(queue, &summary, &scene.lights)?;
         renderer.place_env_maps_blocking(queue, &mut geometry)?;
         let weight = |on: bool| if on { 1.0 } else { 0.0 };
-        let is_one_of = |components: &[Component]| weight(component == Component::All || components.contains(&component));
+        let is_one_of =
+            |components: &[Component]| weight(component == Component::All || components.contains(&component));
         let composite = CompositeSettings {
             output_scale: 1.0,
             direct: is_one_of(&[Component::Direct, Component::Specular]),

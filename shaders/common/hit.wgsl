@@ -13,7 +13,7 @@ struct Hit {
     distance: f32,
     // Unit frame
     position: vec3f,
-    // Geometric, on the side hit
+    // On the side hit: geometric, of metal and glass the shading normal
     normal: vec3f,
     reflectance: vec3f,
     // The surface hit, 0: none in particular

@@ -7,9 +7,11 @@ const PHOTON_LOST: u32 = 3u;
 const PHOTON_STATE_MASK: u32 = 3u;
 const PHOTON_FIRST_HIT: u32 = 256u;
 const PHOTON_TENTATIVE: u32 = 512u;
-// On the surface of a light, before its first hop: position, normal and direction are those of its start, the density is how
-// much more densely photons start this way. Stays on a first hop that is lost or, while another tracer follows, not certain.
+// At its light, before its first hop: position, normal and direction are those of its start, the density is how much more
+// densely photons start this way than by the cosine; with PHOTON_PARALLEL it is one of parallel rays, and the density that per
+// area across them. Stays on a first hop that is lost or, while another tracer follows, not certain.
 const PHOTON_STARTED: u32 = 1024u;
+const PHOTON_PARALLEL: u32 = 8192u;
 // How the surface scatters (lobe.wgsl): bits 2 to 7 are bits 0 to 5 of the lobe, the kind among them; bits 8 to 15 of
 // `light_and_surface` are the others. And whether its back was hit.
 const PHOTON_LOBE_SHIFT: u32 = 2u;

@@ -1,6 +1,6 @@
 // One texel of an environment map or a shadow map: 16 bytes, one rgba32uint fetch.
 //   x  distance along the texel's ray, unit frame, f32 bits; 0: nothing is there
-//   y  geometric normal on the side that is seen, octahedral
+//   y  normal on the side that is seen, octahedral: the geometric one, of metal and glass the shading normal
 //   z  reflectance, 11-11-10
 //   w  bits 0-7 and 9-14 how it scatters (lobe.wgsl), bit 8 the back of a triangle is seen, bits 16-31 the surface, 0: none in
 //      particular

@@ -84,15 +84,23 @@ fn surface_at(v: Vertex, front_facing: bool) -> Surface {
     );
 }
 
+// What a surface texel says of the side that is seen: what reflects and refracts is as smooth as it is shaded, wherever the ray
+// comes from that side.
+fn texel_normal(v: Vertex, surface: Surface) -> vec3f {
+    let ray = select(view.eye.xyz, v.position - view.eye.xyz, view.eye.w > 0.0);
+    let is_same_side = (dot(v.normal, ray) < 0.0) == surface.front_facing;
+    let is_shaded = lobe_is_specular(surface.lobe) && is_same_side && dot(v.normal, v.normal) > 0.0;
+    return normalize(select(surface.geometric_normal, v.normal, is_shaded));
+}
+
 @fragment
 fn fragment_surface(v: Vertex, @builtin(front_facing) front_facing: bool) -> @location(0) vec4u {
     let surface = surface_at(v, front_facing);
     if surface.base_color.a < surface.alpha_cutoff {
         discard;
     }
-    let texel = surface_texel_at(
-        v.position, surface.geometric_normal, surface.base_color.rgb, view.eye, surface.front_facing,
-    );
+    let normal = texel_normal(v, surface);
+    let texel = surface_texel_at(v.position, normal, surface.base_color.rgb, view.eye, surface.front_facing);
     let scattering = surface_texel_scattering(texel, surface.lobe);
     return surface_texel_pack(surface_texel_on(scattering, instances[v.instance].surface));
 }

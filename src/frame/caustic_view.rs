@@ -3,7 +3,9 @@
 use super::Settings;
 use super::indirect_view::IndirectViewInputs;
 use crate::Error;
-use crate::pass::{Bandwidth, PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings, progressive_scale};
+use crate::pass::{
+    Bandwidth, PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings, progressive_scale,
+};
 use crate::resource::{Irradiance, Photons, Subsampling};
 
 /// Range of the density of photons over that of as many spread evenly over all surfaces: caustics may be as bright as they

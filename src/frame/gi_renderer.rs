@@ -433,7 +433,11 @@ impl GiRenderer {
             return Ok(());
         };
         let context = selection_context(&self.device, queue, &self.settings, state);
-        let photons = self.indirect.as_ref().filter(|_| by_photons).map(IndirectScene::photons);
+        let photons = self
+            .indirect
+            .as_ref()
+            .filter(|_| by_photons)
+            .map(IndirectScene::photons);
         self.placement
             .select_blocking(&self.passes.env_map_selector, &context, photons, geometry)?;
         self.renew_centers(queue)

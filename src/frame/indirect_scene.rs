@@ -1,14 +1,14 @@
 //! What all views share of indirect light: photons, and what the settings let them meet.
 
 use super::traced_photons::{TracedPhotons, WalkInputs};
-use super::{IndirectMethod, SceneInputs, Settings};
+use super::{IndirectMethod, SceneInputs, Settings, TracerKind};
 use crate::Error;
 #[cfg(feature = "bvh")]
 use crate::pass::BvhTracer;
 use crate::pass::{
     Bandwidth, DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EmissionImportance,
     EmissionImportanceResources, EmissionUpdateInputs, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources,
-    EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources, EnvMapLightingSettings, ImageSpaceTracer,
+    EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources, EnvMapLightingSettings, FirstHits, ImageSpaceTracer,
     PhotonEmitter, PhotonGrid, PhotonGridInputs, PhotonGridResources, PhotonSpread,
 };
 use crate::resource::{
@@ -100,7 +100,12 @@ impl PhotonPasses {
 
 impl IndirectScene {
     pub(super) fn new(device: &wgpu::Device, queue: &wgpu::Queue, settings: &Settings) -> Result<Self, Error> {
-        let global = TracedPhotons::new(device, settings, settings.photons, PhotonMap::All)?;
+        let global = TracedPhotons::new(
+            device,
+            settings,
+            settings.photons,
+            (PhotonMap::All, settings.tracer_kind),
+        )?;
         let image_space = || {
             let env_maps = EnvMaps::new(
                 device,
@@ -158,7 +163,8 @@ impl IndirectScene {
         if !is_wanted {
             self.caustics = None;
         } else if self.caustics.is_none() {
-            let traced = TracedPhotons::new(device, settings, settings.caustic.photons, PhotonMap::Caustic)?;
+            let kind = settings.caustic_tracer();
+            let traced = TracedPhotons::new(device, settings, settings.caustic.photons, (PhotonMap::Caustic, kind))?;
             self.caustics = Some((traced, PhotonTargets::new(device)?));
         }
         let is_split = self.caustics.is_some();
@@ -274,12 +280,17 @@ impl IndirectScene {
                 None => PhotonSpread::Even,
                 Some((cells, _)) => PhotonSpread::Cells(cells),
             },
+            first_hits: inputs.settings.first_hits,
             maps: env_maps.map(|i| (&i.env_maps, i.hierarchy.as_ref().map(|h| &h.0))),
             sample_offset: scene.sample_offset,
         };
         self.global.record(encoder, passes, &walk_inputs)?;
         if let Some((caustics, targets)) = &mut self.caustics {
             walk_inputs.spread = PhotonSpread::Targets(targets);
+            walk_inputs.first_hits = match inputs.settings.caustic_tracer() {
+                TracerKind::Bvh => FirstHits::Traced,
+                TracerKind::ImageSpace | TracerKind::Hybrid => inputs.settings.first_hits,
+            };
             walk_inputs.sample_offset = inputs.settings.caustic_offset(scene.sample_offset);
             caustics.record(encoder, passes, &walk_inputs)?;
         }

@@ -266,11 +266,7 @@ fn splat(
         settings: &settings,
         timestamps: inputs.view.timestamps,
     };
-    inputs
-        .passes
-        .0
-        .photon_splatter
-        .record(encoder, own, &splatter_inputs);
+    inputs.passes.0.photon_splatter.record(encoder, own, &splatter_inputs);
 }
 
 impl GatherView {

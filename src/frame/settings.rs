@@ -2,7 +2,7 @@
 
 use crate::Error;
 use crate::pass::{
-    Bandwidth, BoundaryCorrection, CoverageMeasure, EnvMapSelectorResources, EnvMapSelectorSettings,
+    Bandwidth, BoundaryCorrection, CoverageMeasure, EnvMapSelectorResources, EnvMapSelectorSettings, FirstHits,
     ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS, MAX_SELECTED, MAX_TAPS, MOST_FILTER_RADIUS, PenumbraSearch,
     PhotonSplatterConfig, PhotonSplatterSettings, SoftShadowSettings, SplatShape, TraceMethod, UpsamplerSettings,
 };
@@ -120,6 +120,9 @@ pub struct Settings {
     /// frames before; the others are spread evenly. Pays where much of the light never comes before the eye, as that of a sun
     /// over a building; costs a look at each photon.
     pub emission_importance: f32,
+    /// How photons find where they first land. Shadow maps are faster, and curved mirrors in them a little flattened. Those of
+    /// caustics are traced wherever there are triangles, which then trace all of their hops.
+    pub first_hits: FirstHits,
     /// Surfaces that light scatters at before the one the eye sees, 0 to 64. 0: direct light only. Each costs a trace;
     /// leaving out bounces darkens.
     pub bounces: u32,
@@ -220,6 +223,7 @@ impl Settings {
             frames: 1,
             photons: 500_000,
             emission_importance: 0.0,
+            first_hits: FirstHits::default(),
             bounces: 3,
             env_map_count: 12,
             env_maps_at_lights: 0,
@@ -324,6 +328,15 @@ impl Settings {
         (u64::from(sample_offset) * u64::from(self.caustic.photons) / u64::from(self.photons.max(1))) as u32
     }
 
+    /// What traces caustic photons: triangles where there are any, for environment maps do not see into glass, and curved
+    /// mirrors are a little flattened in them.
+    pub(super) fn caustic_tracer(&self) -> TracerKind {
+        match self.tracer_kind {
+            TracerKind::Bvh | TracerKind::Hybrid => TracerKind::Bvh,
+            TracerKind::ImageSpace => TracerKind::ImageSpace,
+        }
+    }
+
     /// Whether there are environment maps.
     pub(super) fn needs_env_maps(&self) -> bool {
         self.tracer_kind.uses_env_maps() || self.indirect_method == IndirectMethod::FinalGather
@@ -421,6 +434,13 @@ const KNOBS: &[Knob] = &[
         "0 or more, and below 1",
         emission_importance,
         |v| (0.0..1.0).contains(&v)
+    ),
+    choice!(
+        "emission.first_hits",
+        "shadow-maps or traced",
+        first_hits,
+        ["shadow-maps", FirstHits::ShadowMaps],
+        ["traced", FirstHits::Traced]
     ),
     field!("bounces", "0 to 64", bounces, |v| v <= MAX_BOUNCES),
     field!("env_maps.count", "1 to 31", env_map_count, |v| (1..=MAX_SELECTED)
@@ -524,12 +544,9 @@ const KNOBS: &[Knob] = &[
         caustic.kernel_photons,
         |v: f32| v > 0.0 && v.is_finite()
     ),
-    field!(
-        "caustic.min_radius",
-        "0 to 23 pixels",
-        caustic.min_radius,
-        |v: f32| (0.0..=LARGEST_RADIUS).contains(&v)
-    ),
+    field!("caustic.min_radius", "0 to 23 pixels", caustic.min_radius, |v: f32| {
+        (0.0..=LARGEST_RADIUS).contains(&v)
+    }),
     field!("specular.paths", "1 to 64", specular_paths, |v| (1..=64).contains(&v)),
     field!("specular.surfaces", "1 to 32", specular_surfaces, |v| (1..=32)
         .contains(&v)),

@@ -6,8 +6,8 @@ use crate::Error;
 #[cfg(feature = "bvh")]
 use crate::pass::{BvhTracerInputs, BvhTracerResources};
 use crate::pass::{
-    ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitterInputs, PhotonEmitterResources, PhotonSpread,
-    SharedHop,
+    FirstHits, ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitterInputs, PhotonEmitterResources,
+    PhotonSpread, SharedHop,
 };
 use crate::resource::{DepthHierarchy, EnvMaps, LostRays, PhotonMap, Photons};
 
@@ -15,6 +15,7 @@ use crate::resource::{DepthHierarchy, EnvMaps, LostRays, PhotonMap, Photons};
 #[derive(Debug)]
 pub(super) struct TracedPhotons {
     pub(super) photons: Photons,
+    kind: TracerKind,
     emitter: PhotonEmitterResources,
     image_space: ImageSpaceTracerResources,
     #[cfg(feature = "bvh")]
@@ -28,6 +29,7 @@ pub(super) struct TracedPhotons {
 pub(super) struct WalkInputs<'a> {
     pub(super) photons: &'a PhotonInputs<'a>,
     pub(super) spread: PhotonSpread<'a>,
+    pub(super) first_hits: FirstHits,
     /// While photons are traced in image space.
     pub(super) maps: Option<(&'a EnvMaps, Option<&'a DepthHierarchy>)>,
     /// First index into the random sequence.
@@ -35,8 +37,14 @@ pub(super) struct WalkInputs<'a> {
 }
 
 impl TracedPhotons {
-    pub(super) fn new(device: &wgpu::Device, settings: &Settings, count: u32, map: PhotonMap) -> Result<Self, Error> {
-        let is_shared = settings.tracer_kind == TracerKind::Hybrid;
+    /// `kind`: what traces them, of those that the settings have.
+    pub(super) fn new(
+        device: &wgpu::Device,
+        settings: &Settings,
+        count: u32,
+        (map, kind): (PhotonMap, TracerKind),
+    ) -> Result<Self, Error> {
+        let is_shared = kind == TracerKind::Hybrid;
         let shared_hops = if is_shared { settings.bounces } else { 0 };
         let mut photons = Photons::new(device, count, settings.bounces)?;
         photons.set_map(map);
@@ -46,6 +54,7 @@ impl TracedPhotons {
             #[cfg(feature = "bvh")]
             bvh: BvhTracerResources::for_shared_hops(device, shared_hops)?,
             lost: is_shared.then(|| LostRays::new(device, &photons)).transpose()?,
+            kind,
             photons,
         })
     }
@@ -69,6 +78,7 @@ impl TracedPhotons {
             shadow_maps: inputs.photons.shadow_maps,
             photons: &self.photons,
             spread: inputs.spread,
+            first_hits: inputs.first_hits,
             sample_offset: inputs.sample_offset,
             timestamps: inputs.photons.scene.timestamps,
         };
@@ -78,8 +88,8 @@ impl TracedPhotons {
         if self.lost.is_none() {
             return self.record_walk(encoder, passes, inputs, None);
         }
-        let first = if inputs.photons.lights.have_area() { 0 } else { 1 };
-        let mut hops = first..=self.photons.bounces();
+        let starts_at_lights = inputs.first_hits == FirstHits::Traced || inputs.photons.lights.have_area();
+        let mut hops = u32::from(!starts_at_lights)..=self.photons.bounces();
         hops.try_for_each(|hop| self.record_walk(encoder, passes, inputs, Some(hop)))
     }
 
@@ -94,7 +104,9 @@ impl TracedPhotons {
         let (scene, settings) = (inputs.photons.scene, inputs.photons.settings);
         let lost = self.lost.as_ref();
         let shared = hop.zip(lost).map(|(number, lost)| SharedHop { number, lost });
-        if let (Some(tracer), Some((env_maps, hierarchy))) = (&passes.image_space_tracer, inputs.maps) {
+        if let (Some(tracer), Some((env_maps, hierarchy))) = (&passes.image_space_tracer, inputs.maps)
+            && self.kind.uses_env_maps()
+        {
             let tracer_inputs = ImageSpaceTracerInputs {
                 queue: scene.queue,
                 env_maps,
@@ -108,7 +120,9 @@ impl TracedPhotons {
             tracer.record(encoder, &mut self.image_space, &tracer_inputs)?;
         }
         #[cfg(feature = "bvh")]
-        if let (Some(tracer), Some(geometry)) = (&passes.bvh_tracer, scene.bvh) {
+        if let (Some(tracer), Some(geometry)) = (&passes.bvh_tracer, scene.bvh)
+            && self.kind.uses_triangles()
+        {
             let tracer_inputs = BvhTracerInputs {
                 queue: scene.queue,
                 geometry,

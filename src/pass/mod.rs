@@ -61,7 +61,7 @@ pub use irradiance_filter::{
     IrradianceFilter, IrradianceFilterInputs, IrradianceFilterResources, IrradianceFilterSettings,
 };
 pub use nearest_occluder::{NearestOccluder, NearestOccluderInputs, NearestOccluderResources};
-pub use photon_emitter::{PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources, PhotonSpread};
+pub use photon_emitter::{FirstHits, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources, PhotonSpread};
 pub use photon_grid::{PhotonGrid, PhotonGridInputs, PhotonGridResources};
 pub(crate) use photon_splatter::LARGEST_RADIUS;
 pub use photon_splatter::{

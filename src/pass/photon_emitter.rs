@@ -3,8 +3,8 @@
 //! Inputs: [`Lights`], [`ShadowMaps`], and what says where photons start if they are not spread evenly ([`PhotonSpread`]).
 //! Output: [`Photons`], hop 0. Cost: proportional to the number of photons, one texel fetch each; of photons that are aimed, times
 //! the number of targets. Directions follow the Halton sequence; first hits are looked up in the light's reflective shadow map
-//! (Yao et al. 2010, section 7). Photons of flat lights start anywhere on their surfaces, and hop 0 is left to the tracer, which
-//! traces it like any other. Limits: the extent of other lights is not sampled.
+//! (Yao et al. 2010, section 7), or left to the tracer, which traces hop 0 like any other ([`FirstHits`]); it always is for flat
+//! lights, whose photons start anywhere on their surfaces. Limits: the extent of other lights is not sampled.
 
 use super::dispatch_64;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
@@ -23,6 +23,7 @@ pub(crate) mod gpu {
         pub(crate) sample_offset: u32,
         pub(crate) shadow_map_size: u32,
         pub(crate) row: u32,
+        pub(crate) traces_first: u32,
     }
 }
 
@@ -47,6 +48,16 @@ pub enum PhotonSpread<'a> {
     Cells(&'a EmissionCells),
     /// Towards targets alone, evenly in the solid angles that these fill.
     Targets(&'a PhotonTargets),
+}
+
+/// How photons of lights that are not flat find where they first land.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum FirstHits {
+    /// In the light's reflective shadow map: a fetch each, exact to within its texels (Yao et al. 2010, section 7).
+    #[default]
+    ShadowMaps,
+    /// Hop 0 is traced like any other.
+    Traced,
 }
 
 /// The pass.
@@ -81,6 +92,8 @@ pub struct PhotonEmitterInputs<'a> {
     pub photons: &'a Photons,
     /// Where they start.
     pub spread: PhotonSpread<'a>,
+    /// How they find where they land.
+    pub first_hits: FirstHits,
     /// First index into the random sequence: constant in real time, so that nothing flickers; advanced by the number of
     /// photons per frame when accumulating.
     pub sample_offset: u32,
@@ -143,6 +156,7 @@ impl PhotonEmitter {
             sample_offset: inputs.sample_offset,
             shadow_map_size: inputs.shadow_maps.size(),
             row,
+            traces_first: u32::from(inputs.first_hits == FirstHits::Traced),
         };
         inputs
             .queue
@@ -163,9 +177,7 @@ impl PhotonEmitter {
         };
         let spread_group = spread.map(|buffer| {
             let bound = [buffer.into()];
-            resources
-                .groups
-                .get(&self.device, label, &self.spread_layout, &bound)
+            resources.groups.get(&self.device, label, &self.spread_layout, &bound)
         });
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(pipeline);

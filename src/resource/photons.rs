@@ -14,9 +14,9 @@ pub struct Photon {
     /// Where the hop ended, unit frame.
     pub position: [f32; 3],
     /// Low two bits: a [`PhotonState`]. Bits 2 to 7: bits 0 to 5 of the surface's lobe, 0 if it is diffuse. Bit 8: the path came
-    /// straight from its light. Bit 9: the tracer is not sure of the hop. Bit 10: the hop begins here, on a light's surface, and is
+    /// straight from its light. Bit 9: the tracer is not sure of the hop. Bit 10: the hop begins here, at its light, and is
     /// still to be traced; `position`, `normal` and `direction` are those of its start. Bit 11: the surface's back is hit. Bit 12: it
-    /// came by way of metal and glass alone, in a [`PhotonMap::Global`]. Bits 16
+    /// came by way of metal and glass alone, in a [`PhotonMap::Global`]. Bit 13, beside bit 10: the light's rays are parallel. Bits 16
     /// to 31, the same for all hops of a path, and 0 after its end: see [`EmissionCells`](super::EmissionCells); bits 16 to 23 are
     /// the cell that it started in, bits 24 to 31 b where photons start 2^((b − 128) / 16) times as densely there as if they were
     /// spread evenly, 0 where they are. Others 0.
@@ -27,7 +27,7 @@ pub struct Photon {
     /// direction), 1 / (unit-frame length)². On metal and glass instead, in the upper and the lower 16 bits, the upper halves of the
     /// radius of a photon's footprint and of its growth in a unit of length.
     pub density: f32,
-    /// Geometric normal on the side hit, octahedral (`pack2x16snorm`).
+    /// Normal on the side hit, octahedral (`pack2x16snorm`): the geometric one, of metal and glass the shading normal.
     pub normal: u32,
     /// Direction of travel, octahedral.
     pub direction: u32,
@@ -59,7 +59,7 @@ impl Photon {
     /// Bit of `state` that marks a hop of which the tracer is not sure: a surer one should walk it again.
     pub const TENTATIVE: u32 = 512;
 
-    /// Bit of `state` that marks a photon on the surface of a light, whose first hop is not traced yet.
+    /// Bit of `state` that marks a photon at its light, whose first hop is not traced yet.
     pub const STARTED: u32 = 1024;
 
     pub(crate) const BOOST_ONE: f32 = 128.0;

@@ -74,8 +74,13 @@ impl BoundingSphere {
         if most <= 1 {
             return Self::around(balls).into_iter().collect();
         }
-        let centers = balls.iter().map(|b| SceneBounds { min: b.center, max: b.center });
-        let extent = centers.reduce(|a, b| a.union(&b)).map_or(DVec3::ZERO, |b| b.max - b.min);
+        let centers = balls.iter().map(|b| SceneBounds {
+            min: b.center,
+            max: b.center,
+        });
+        let extent = centers
+            .reduce(|a, b| a.union(&b))
+            .map_or(DVec3::ZERO, |b| b.max - b.min);
         let axis = extent.max_position();
         let mut sorted = balls.to_vec();
         sorted.sort_by(|a, b| a.center[axis].total_cmp(&b.center[axis]));

@@ -38,7 +38,7 @@ fn emit_at_targets(light: Light, light_index: u32, sequence_index: u32, count: u
         return nothing_emitted();
     }
     let all = light.photon_flux * f32(max(light.photon_count, 1u));
-    return photon_landed(light_index, ray, aim.density, all * (density / (f32(count) * aim.density)), 0u);
+    return photon_on_ray(light_index, ray, aim.density, all * (density / (f32(count) * aim.density)), 0u);
 }
 
 @compute @workgroup_size(64)

@@ -69,5 +69,5 @@ fn emit_photon(index: u32, start: EmissionStart, kept: u32) {
         return;
     }
     let emission = emit(light, start.u);
-    photons[index] = photon_landed(light_index, emission.ray, start.boost * emission.pdf, light.photon_flux / start.boost, kept);
+    photons[index] = photon_on_ray(light_index, emission.ray, start.boost * emission.pdf, light.photon_flux / start.boost, kept);
 }

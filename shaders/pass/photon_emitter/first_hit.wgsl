@@ -1,5 +1,5 @@
-// Where emitted photons first land: in the light's reflective shadow map. Those of flat lights start on their surface instead,
-// and the walk traces their first hop.
+// Where emitted photons first land: in the light's reflective shadow map. Or they only set out, as those of flat lights do from
+// their surface, and the walk traces their first hop.
 
 struct Params {
     photon_count: u32,
@@ -7,6 +7,8 @@ struct Params {
     sample_offset: u32,
     shadow_map_size: u32,
     row: u32,
+    // 1: photons only set out
+    traces_first: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -81,7 +83,19 @@ fn photon_started(start: SurfaceStart, light_index: u32, direction: vec3f, boost
     );
 }
 
-// Where a ray of light lands; `pdf`: of photons along it, per solid angle or per perpendicular area (directional).
+// On a ray of a light that is not flat; `pdf`: of photons along it, per solid angle or per perpendicular area (directional).
+fn photon_on_ray(light_index: u32, ray: LightRay, pdf: f32, flux: vec3f, kept: u32) -> Photon {
+    if params.traces_first == 0u {
+        return photon_landed(light_index, ray, pdf, flux, kept);
+    }
+    let direction = octahedral_pack(ray.direction);
+    let is_parallel = lights[light_index].kind == LIGHT_DIRECTIONAL;
+    let state = PHOTON_EMPTY | PHOTON_STARTED | select(0u, PHOTON_PARALLEL, is_parallel) | kept;
+    let density = pdf * select(POLYGON_PI, 1.0, is_parallel);
+    return Photon(ray.origin, state, flux, density, direction, direction, 0u, light_index);
+}
+
+// Where such a ray lands.
 fn photon_landed(light_index: u32, ray: LightRay, pdf: f32, flux: vec3f, kept: u32) -> Photon {
     let light = lights[light_index];
     let at = cube_face_texel(ray.uv, params.shadow_map_size);

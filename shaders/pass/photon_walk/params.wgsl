@@ -2,7 +2,7 @@
 
 struct WalkParams {
     photon_count: u32,
-    // Walked are these hops and those between them; hop 0 only where photons start on surfaces of lights
+    // Walked are these hops and those between them; hop 0 only where photons start at their lights
     first_hop: u32,
     last_hop: u32,
     // First scattering that Russian roulette may end

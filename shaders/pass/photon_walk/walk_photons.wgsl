@@ -109,7 +109,7 @@ fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) ->
     return arrived(photon, flux, direction, spread_from_point(WALK_INVERSE_PI * local.z), hit);
 }
 
-// The first hop of a photon that stands on the surface of a light.
+// The first hop of a photon that stands at its light.
 fn first_photon(start: Photon) -> Photon {
     let normal = octahedral_unpack(start.normal);
     let direction = octahedral_unpack(start.direction);
@@ -120,8 +120,11 @@ fn first_photon(start: Photon) -> Photon {
         lost.state = (start.state & ~PHOTON_STATE_MASK) | PHOTON_LOST;
         return lost;
     }
-    let density = start.density * WALK_INVERSE_PI * max(0.0, dot(normal, direction));
-    var photon = arrived(start, start.flux, direction, spread_from_point(density), hit);
+    var spread = spread_from_point(start.density * WALK_INVERSE_PI * max(0.0, dot(normal, direction)));
+    if (start.state & PHOTON_PARALLEL) != 0u {
+        spread = Spread(0.0, inverseSqrt(max(start.density, 1e-20)), 0.0);
+    }
+    var photon = arrived(start, start.flux, direction, spread, hit);
     photon.state |= PHOTON_FIRST_HIT;
     return photon;
 }
