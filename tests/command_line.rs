@@ -87,8 +87,7 @@ fn bad_input_gets_one_line_status_two_and_no_file() {
             &["sample:cornell", "--preset", "reference", "--frames", "0"],
             "1 or more",
         ),
-        (&["sample:cornell", "--component", "caustic"], "not available yet"),
-        (&["sample:cornell", "--component", "specular"], "not available yet"),
+        (&["sample:cornell", "--component", "glossy"], "--component"),
         (&["sample:cornell", "--tracer", "fastest"], "--tracer"),
         (
             &["sample:cornell", "--set", "tracer.kind=none"],

@@ -360,6 +360,7 @@ fn an_engine_without_emission_gives_one_black_texel_and_the_composite_adds_nothi
         g_buffer: &indirect.g_buffer,
         direct: &black,
         indirect: &indirect.irradiance,
+        caustic: None,
         specular: None,
         radiance: &radiance,
         settings: &CompositeSettings {

@@ -429,6 +429,7 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
         g_buffer: &g_buffer,
         direct: &direct,
         indirect: &indirect,
+        caustic: None,
         specular: None,
         radiance: &radiance,
         settings: &CompositeSettings {

@@ -95,7 +95,8 @@ fn means(pixels: &[[f32; 3]]) -> DVec3 {
     pixels.iter().map(|&p| Vec3::from(p).as_dvec3()).sum::<DVec3>() / pixels.len() as f64
 }
 
-fn reference(gpu: &Gpu, scene: &Scene, component: PathComponent, samples: u32) -> DVec3 {
+/// Mean of all pixels and its standard error.
+fn reference(gpu: &Gpu, scene: &Scene, component: PathComponent, samples: u32) -> [DVec3; 2] {
     let settings = PathTracerSettings {
         component,
         bounces: 4,
@@ -103,7 +104,10 @@ fn reference(gpu: &Gpu, scene: &Scene, component: PathComponent, samples: u32) -
     };
     let mut reference = Reference::new(gpu, scene.clone(), &settings, 0, SIZE).unwrap();
     (0..samples).for_each(|_| reference.render_sample(None).unwrap());
-    means(&reference.read().unwrap().mean)
+    let estimate = reference.read().unwrap();
+    let squared: Vec<_> = estimate.standard_error.iter().map(|e| e.map(|e| e * e)).collect();
+    let error = (means(&squared) / squared.len() as f64).to_array().map(f64::sqrt);
+    [means(&estimate.mean), DVec3::from(error)]
 }
 
 #[test]
@@ -269,13 +273,112 @@ fn rooms_with_a_mirror_glass_or_brass_have_as_much_light_as_the_path_tracer_find
             (direct + indirect - all).abs().max_element() < 1e-3 * all.max_element(),
             "{name}"
         );
-        let expected = reference(&gpu, &scene, PathComponent::Indirect, 256);
-        println!("{name}: indirect {indirect}, expected {expected}");
+        let caustic = part(Component::Caustic);
+        let caustic = part(Component::Caustic);
+        for (what, found, path_component, samples) in [
+            ("indirect", indirect, PathComponent::Indirect, 256),
+            ("caustic", caustic, PathComponent::Caustic, 1024),
+        ] {
+            let [expected, noise] = reference(&gpu, &scene, path_component, samples);
+            println!("{name}: {what} {found}, expected {expected} ± {noise}");
+            let error = (found - expected).abs() - 3.0 * noise;
+            assert!(
+                (error / expected).max_element() < 0.03,
+                "{name}: {what} {found}, {expected}"
+            );
+        }
+        // With photons of their own or among the others: nothing counts twice, nothing is left out.
+        let mut together = settings();
+        together.caustic.photons = 0;
+        let together = means(&offline::render(&gpu, &scene, &together, SIZE, Component::Indirect).unwrap());
         assert!(
-            (indirect / expected - 1.0).abs().max_element() < 0.03,
-            "{name}: {indirect}, {expected}"
+            (together / indirect - 1.0).abs().max_element() < 0.02,
+            "{name}: {together} or {indirect}"
         );
     }
+    assert_no_errors(&gpu);
+}
+
+/// Flux that arrives at specular surfaces straight from the lights, by the photons of all light or by those of caustics; and
+/// which share of these photons does.
+fn first_flux(gpu: &Gpu, scene: &Scene, tracer_kind: TracerKind, is_caustic: bool) -> (DVec3, f64) {
+    let mut settings = Settings {
+        frames: 1,
+        photons: 200_000,
+        tracer_kind,
+        shadow_map_size: 1024,
+        ..settings()
+    };
+    settings.caustic.photons = 50_000;
+    let mut offline = Offline::new(gpu, scene.clone(), &settings, 0, SIZE, Component::All).unwrap();
+    offline.render_frame(None).unwrap();
+    let photons = match is_caustic {
+        true => offline.renderer.caustic_photons(),
+        false => offline.renderer.photons(),
+    };
+    let photons = photons.unwrap();
+    let records: Vec<Photon> = read_buffer_blocking(&gpu.device, &gpu.queue, photons.buffer()).unwrap();
+    let first = &records[..photons.count() as usize];
+    // Bits 2 and 3: metal or glass.
+    let is_specular = |p: &&Photon| p.state() == PhotonState::Stored && p.state & 12 != 0;
+    let landed: Vec<_> = first.iter().filter(is_specular).collect();
+    let flux = landed.iter().map(|p| Vec3::from(p.flux).as_dvec3()).sum();
+    (flux, landed.len() as f64 / first.len() as f64)
+}
+
+#[test]
+fn photons_that_are_aimed_bring_as_much_light_as_those_that_are_not_and_more_of_them_arrive() {
+    let Some(gpu) = gpu() else { return };
+    // Two balls that hide each other in part, and one of brass around which the lamp is.
+    let mut scene = with_ball(mirror());
+    let ball = scene.instances.last().unwrap().clone();
+    for (x, z) in [(2.7, 1.9), (4.2, 3.4)] {
+        scene.instances.push(Instance {
+            transform: DAffine3::from_translation(DVec3::new(x - 1.9, -0.4, z - 1.5)) * ball.transform,
+            ..ball.clone()
+        });
+    }
+    let above = DVec3::new(2.78, 5.2, 2.795);
+    let lamps = [
+        ("point", Light::point(above, 30.0, [1.0, 0.8, 0.5])),
+        (
+            "spot",
+            Light {
+                kind: LightKind::Spot {
+                    position: above,
+                    direction: DVec3::new(-0.1, -1.0, -0.2).normalize(),
+                    inner_angle: 0.2,
+                    outer_angle: 0.6,
+                    radius: 0.0,
+                },
+                ..Light::point(above, 30.0, [1.0, 0.8, 0.5])
+            },
+        ),
+        ("rectangle", scene.lights[0].clone()),
+    ];
+    let check = |name: &str, scene: &Scene| {
+        for kind in [TracerKind::Bvh, TracerKind::ImageSpace] {
+            let (even, even_share) = first_flux(&gpu, scene, kind, false);
+            let (aimed, aimed_share) = first_flux(&gpu, scene, kind, true);
+            println!("{name}, {kind:?}: evenly {even} by {even_share:.3}, aimed {aimed} by {aimed_share:.3}");
+            assert!((aimed / even - 1.0).abs().max_element() < 0.015, "{name}, {kind:?}");
+            assert!(aimed_share > even_share && aimed_share > 0.5, "{name}, {kind:?}");
+        }
+    };
+    for (name, lamp) in lamps {
+        scene.lights = vec![lamp];
+        check(name, &scene);
+    }
+    // A sun shines into no closed box.
+    scene.lights = vec![Light {
+        kind: LightKind::Directional {
+            direction: DVec3::new(0.2, -1.0, 0.3).normalize(),
+            angle: 0.0,
+        },
+        ..Light::point(above, 3.0, [1.0, 0.8, 0.5])
+    }];
+    scene.instances.drain(..scene.instances.len() - 3);
+    check("sun", &scene);
     assert_no_errors(&gpu);
 }
 
@@ -290,13 +393,14 @@ fn nothing_is_made_or_recorded_for_specular_surfaces_where_there_are_none() {
         let mut offline = Offline::new(&gpu, scene, &settings, 0, SIZE, Component::All).unwrap();
         offline.render_frame(None).unwrap();
         let plan = offline.renderer.plan().unwrap();
-        let on = [Stage::PhotonGrid, Stage::SpecularPaths].map(|stage| plan.is_on(stage));
+        let on = [Stage::CausticMap, Stage::PhotonGrid, Stage::SpecularPaths].map(|stage| plan.is_on(stage));
         let memory = offline.memory_by_resource();
-        let made = ["photon_grid", "specular_paths"].map(|name| memory.iter().any(|(n, _)| *n == name));
+        let names = ["caustic_photons", "caustic_irradiance", "photon_grid", "specular_paths"];
+        let made = names.map(|name| memory.iter().any(|(n, _)| *n == name));
         (on, made)
     };
-    assert_eq!(used(samples::cornell(0.0)), ([false; 2], [false; 2]));
-    assert_eq!(used(with_ball(mirror())), ([true; 2], [true; 2]));
+    assert_eq!(used(samples::cornell(0.0)), ([false; 3], [false; 4]));
+    assert_eq!(used(with_ball(mirror())), ([true; 3], [true; 4]));
     assert_no_errors(&gpu);
 }
 
@@ -342,4 +446,23 @@ fn a_flat_mirror_shows_the_room_before_it() {
     println!("in the mirror {found}, expected {wanted}");
     assert!((found / wanted - 1.0).abs().max_element() < 0.05, "{found}, {wanted}");
     assert_no_errors(&gpu);
+}
+#[test]
+fn zz_tmp() {
+    let Some(gpu) = gpu() else { return };
+    for material in [mirror(), glass()] {
+    let mut scene = with_ball(material);
+    scene.lights[0].kind = LightKind::Rectangle {
+        center: DVec3::new(2.78, 5.4, 2.795),
+        half_u: DVec3::new(2.2, 0.0, 0.0),
+        half_v: DVec3::new(0.0, 0.0, 2.2),
+    };
+        let mut s = settings();
+        s.photons = 1000;
+        s.frames = 4;
+        let caustic = means(&offline::render(&gpu, &scene, &s, SIZE, Component::Caustic).unwrap());
+    let [c2, e] = reference(&gpu, &scene, PathComponent::Caustic, 5000);
+    println!("flat {c2} {e}");
+        println!("flat {caustic} {}", caustic / c2 - 1.0);
+    }
 }

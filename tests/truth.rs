@@ -57,6 +57,8 @@ fn name(component: Component) -> &'static str {
         Component::All => "all",
         Component::Direct => "direct",
         Component::Indirect => "indirect",
+        Component::Caustic => "caustic",
+        Component::Specular => "specular",
     }
 }
 

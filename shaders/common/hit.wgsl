@@ -20,11 +20,13 @@ struct Hit {
     surface: u32,
     // How it scatters (lobe.wgsl), and HIT_BACK
     lobe: u32,
+    // Factor of a photon's flux where the normal is not that of the triangle; else 1
+    adjoint: f32,
 }
 
 // Beside a lobe: the back of a surface is hit, as from inside a body.
 const HIT_BACK: u32 = 0x4000u;
 
 fn hit_nothing(kind: u32) -> Hit {
-    return Hit(kind, 0.0, vec3f(0.0), vec3f(0.0), vec3f(0.0), 0u, 0u);
+    return Hit(kind, 0.0, vec3f(0.0), vec3f(0.0), vec3f(0.0), 0u, 0u, 1.0);
 }

@@ -74,7 +74,7 @@ fn trace_chord(under: vec2f, over: vec2f) -> f32 {
 fn trace_hit(surface: SurfaceTexel, distance: f32, p: vec3f) -> Hit {
     let back = select(0u, HIT_BACK, (surface.flags & SURFACE_TEXEL_BACK_FACE) != 0u);
     let lobe = surface_texel_lobe(surface) | back;
-    return Hit(HIT_SURFACE, distance, p, surface.normal, surface.reflectance, surface_texel_surface(surface), lobe);
+    return Hit(HIT_SURFACE, distance, p, surface.normal, surface.reflectance, surface_texel_surface(surface), lobe, 1.0);
 }
 
 // Ray against the plane of the texel's surface: it must be met from the front, and near where the texel lies.

@@ -52,7 +52,7 @@ fn arrived(origin: Photon, flux: vec3f, direction: vec3f, spread: Spread, hit: H
     return Photon(
         hit.position,
         select(PHOTON_STORED, PHOTON_STORED | PHOTON_TENTATIVE, hit.kind == HIT_TENTATIVE) | kept | photon_lobe_state(hit.lobe),
-        flux,
+        flux * hit.adjoint,
         arrived_density(spread, cosine, distance, hit.lobe),
         octahedral_pack(hit.normal),
         octahedral_pack(direction),
