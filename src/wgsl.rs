@@ -694,4 +694,7 @@ pub const COMMON: &str = compose![
     "common/random.wgsl",
     "common/halton.wgsl",
     "common/hash.wgsl",
+    "common/scatter.wgsl",
+    "common/ggx.wgsl",
+    "common/fresnel.wgsl",
 ];

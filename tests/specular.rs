@@ -451,18 +451,18 @@ fn a_flat_mirror_shows_the_room_before_it() {
 fn zz_tmp() {
     let Some(gpu) = gpu() else { return };
     for material in [mirror(), glass()] {
-    let mut scene = with_ball(material);
-    scene.lights[0].kind = LightKind::Rectangle {
-        center: DVec3::new(2.78, 5.4, 2.795),
-        half_u: DVec3::new(2.2, 0.0, 0.0),
-        half_v: DVec3::new(0.0, 0.0, 2.2),
-    };
+        let mut scene = with_ball(material);
+        scene.lights[0].kind = LightKind::Rectangle {
+            center: DVec3::new(2.78, 5.4, 2.795),
+            half_u: DVec3::new(2.2, 0.0, 0.0),
+            half_v: DVec3::new(0.0, 0.0, 2.2),
+        };
         let mut s = settings();
         s.photons = 1000;
         s.frames = 4;
         let caustic = means(&offline::render(&gpu, &scene, &s, SIZE, Component::Caustic).unwrap());
-    let [c2, e] = reference(&gpu, &scene, PathComponent::Caustic, 5000);
-    println!("flat {c2} {e}");
+        let [c2, e] = reference(&gpu, &scene, PathComponent::Caustic, 5000);
+        println!("flat {c2} {e}");
         println!("flat {caustic} {}", caustic / c2 - 1.0);
     }
 }
