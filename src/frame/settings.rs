@@ -93,7 +93,7 @@ impl Default for CausticSettings {
         Self {
             photons: 100_000,
             kernel_photons: 40.0,
-            min_radius: 1.5,
+            min_radius: 0.75,
         }
     }
 }
@@ -254,6 +254,11 @@ impl Settings {
         Self {
             frames: 64,
             photons: 200_000,
+            caustic: CausticSettings {
+                kernel_photons: 4.0,
+                min_radius: 0.0,
+                ..Default::default()
+            },
             specular_surfaces: 12,
             specular_paths: 1,
             emission_importance: 0.0,
