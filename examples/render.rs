@@ -62,7 +62,7 @@ enum Method {
 )]
 struct Arguments {
     /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, plane, furnace, two-rooms, pillars,
-    /// penumbra, living-room, colonnade)
+    /// penumbra, living-room, colonnade, glass-sphere, ring-occluder, dimpled-mirror, water)
     scene: String,
     /// Width in pixels
     #[arg(long, default_value_t = 512)]

@@ -6,7 +6,7 @@ use super::selection::Selector;
 use lightfall::Error;
 use lightfall::frame::{Settings, TracerKind};
 use lightfall::glam::Vec3;
-use lightfall::pass::{CoverageMeasure, TraceMethod};
+use lightfall::pass::{CoverageMeasure, ImageSpaceTracerSettings, TraceMethod};
 use lightfall::resource::{Photon, PhotonState, SurfaceRay};
 
 /// Paths of each walk, which take the same random numbers.
@@ -48,16 +48,22 @@ pub(crate) fn table(bench: &mut Bench<'_>, selector: &mut Selector) -> Result<()
             .collect::<Vec<_>>()
     };
     let right: Vec<f64> = hops(&right).iter().map(|hop| stored(hop)).collect();
-    for (count, size) in [(8, 256), (12, 512)] {
+    for (count, size) in [(8, 256), (12, 512), (20, 512)] {
         let centers = selector.select(bench, count, CoverageMeasure::Photons)?.centers;
         let kinds = TraceMethod::ALL.map(|method| (TracerKind::ImageSpace, method));
+        let sure = |(kind, method)| (kind, method, false);
         let hybrids = [
-            TraceMethod::OrderedMarch,
-            TraceMethod::OrderedWalk,
-            TraceMethod::VerifiedWalk,
+            (TracerKind::Hybrid, TraceMethod::OrderedMarch, false),
+            (TracerKind::Hybrid, TraceMethod::OrderedWalk, false),
+            (TracerKind::Hybrid, TraceMethod::VerifiedWalk, false),
+            (TracerKind::Hybrid, TraceMethod::VerifiedWalk, true),
         ];
-        for (tracer_kind, trace_method) in kinds.into_iter().chain(hybrids.map(|m| (TracerKind::Hybrid, m))) {
+        for (tracer_kind, trace_method, doubts_normals) in kinds.map(sure).into_iter().chain(hybrids) {
             let settings = Settings {
+                tracer: ImageSpaceTracerSettings {
+                    doubts_normals,
+                    ..base.tracer
+                },
                 env_map_count: count,
                 env_map_size: size,
                 tracer_kind,
@@ -71,8 +77,9 @@ pub(crate) fn table(bench: &mut Bench<'_>, selector: &mut Selector) -> Result<()
                 let misplaced = misplaced(bench, &walked[hop - 1], &walked[hop])?;
                 cells[1].push(format!("{:.2}", 100.0 * misplaced));
             }
-            let name = match tracer_kind {
-                TracerKind::Hybrid => format!("{trace_method:?}, hybrid"),
+            let name = match (tracer_kind, doubts_normals) {
+                (TracerKind::Hybrid, true) => format!("{trace_method:?}, hybrid that doubts normals"),
+                (TracerKind::Hybrid, false) => format!("{trace_method:?}, hybrid"),
                 _ => format!("{trace_method:?}"),
             };
             let [lost, misplaced] = cells.map(|c| c.join(", "));

@@ -1,9 +1,11 @@
 //! Procedural scenes for docs, tests and measurements. Each is a function of time, in seconds; lengths are in metres.
 
+mod caustics;
 mod colonnade;
 mod living_room;
 mod solids;
 
+pub use caustics::{dimpled_mirror, glass_sphere, ring_occluder, water};
 pub use colonnade::colonnade;
 pub use living_room::living_room;
 
@@ -12,7 +14,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Names accepted by [`by_name`], in the order of this list.
-pub const NAMES: [&str; 9] = [
+pub const NAMES: [&str; 13] = [
     "cornell",
     "cornell-spot",
     "plane",
@@ -22,6 +24,10 @@ pub const NAMES: [&str; 9] = [
     "penumbra",
     "living-room",
     "colonnade",
+    "glass-sphere",
+    "ring-occluder",
+    "dimpled-mirror",
+    "water",
 ];
 
 /// The sample of this name at `time`, or `None` if there is none.
@@ -36,6 +42,10 @@ pub fn by_name(name: &str, time: f64) -> Option<Scene> {
         "penumbra" => penumbra(time),
         "living-room" => living_room(time),
         "colonnade" => colonnade(time),
+        "glass-sphere" => glass_sphere(time),
+        "ring-occluder" => ring_occluder(time),
+        "dimpled-mirror" => dimpled_mirror(time),
+        "water" => water(time),
         _ => return None,
     })
 }
@@ -487,6 +497,10 @@ mod tests {
             "penumbra",
             "living-room",
             "colonnade",
+            "glass-sphere",
+            "ring-occluder",
+            "dimpled-mirror",
+            "water",
         ];
         for name in moving {
             let (a, b) = (by_name(name, 0.0).unwrap(), by_name(name, 1.0).unwrap());

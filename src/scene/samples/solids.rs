@@ -53,6 +53,30 @@ pub(super) fn sphere(radius: f64, rings: u32, facets: u32) -> Mesh {
     lathe(&profile, facets)
 }
 
+/// A surface of heights over a rectangle of the x-z plane, `cells` squares along each axis, seen from above. Open, unlike all
+/// else here.
+pub(super) fn heights(x: [f64; 2], z: [f64; 2], cells: u32, height: impl Fn(f64, f64) -> f64) -> Mesh {
+    let mut mesh = Mesh::default();
+    let step = [x, z].map(|[from, to]| (to - from) / f64::from(cells));
+    let small = [1e-3 * step[0], 1e-3 * step[1]];
+    for i in 0..=cells {
+        for j in 0..=cells {
+            let (x, z) = (x[0] + step[0] * f64::from(i), z[0] + step[1] * f64::from(j));
+            let along_x = (height(x + small[0], z) - height(x - small[0], z)) / (2.0 * small[0]);
+            let along_z = (height(x, z + small[1]) - height(x, z - small[1])) / (2.0 * small[1]);
+            mesh.positions.push(DVec3::new(x, height(x, z), z).as_vec3().to_array());
+            let normal = DVec3::new(-along_x, 1.0, -along_z).normalize();
+            mesh.normals.push(normal.as_vec3().to_array());
+        }
+    }
+    for (i, j) in (0..cells * cells).map(|k| (k / cells, k % cells)) {
+        let a = i * (cells + 1) + j;
+        let (b, c, d) = (a + 1, a + cells + 1, a + cells + 2);
+        mesh.indices.extend([a, b, d, a, d, c]);
+    }
+    mesh
+}
+
 /// A round bar between two points, of these radii at its ends.
 pub(super) fn rod(from: DVec3, to: DVec3, radii: [f64; 2], facets: u32) -> Mesh {
     let length = (to - from).length();
