@@ -90,7 +90,7 @@ fn texel_normal(v: Vertex, surface: Surface) -> vec3f {
     let ray = select(view.eye.xyz, v.position - view.eye.xyz, view.eye.w > 0.0);
     let is_same_side = (dot(v.normal, ray) < 0.0) == surface.front_facing;
     let is_shaded = lobe_is_specular(surface.lobe) && is_same_side && dot(v.normal, v.normal) > 0.0;
-    return normalize(select(surface.geometric_normal, v.normal, is_shaded));
+    return select(surface.geometric_normal, normalize(v.normal), is_shaded);
 }
 
 @fragment
