@@ -211,7 +211,7 @@ fn rough_lobes_are_drawn_as_their_densities_say_and_scatter_what_a_quadrature_fi
         );
         let drawn = run(&gpu, &body, &inputs);
         let points: Vec<_> = (0..CASES).map(|case| quadrature(lobe, case)).collect();
-        // A quarter of the points along each axis is enough for a density.
+        // One point in seven is enough for a density.
         let sparse = |case: usize| points[case].iter().step_by(7);
         let directions: Vec<[f32; 4]> = (0..CASES)
             .flat_map(|case| sparse(case).map(move |p| p.direction.as_vec3().extend(case as f32).to_array()))

@@ -350,7 +350,7 @@ fn first_flux(gpu: &Gpu, scene: &Scene, tracer_kind: TracerKind) -> [(DVec3, f64
 #[test]
 fn photons_that_are_aimed_bring_as_much_light_as_those_that_are_not_and_more_of_them_arrive() {
     let Some(gpu) = gpu() else { return };
-    // Two balls that hide each other in part, and one of brass around which the lamp is.
+    // Three balls, of which two overlap as the lamps see them.
     let mut scene = with_ball(mirror());
     let ball = scene.instances.last().unwrap().clone();
     for (x, z) in [(2.7, 1.9), (4.2, 3.4)] {
