@@ -14,7 +14,7 @@ use common::adapter::{Gpu, Wishes};
 use common::clock::Clock;
 use common::offline::{Component, Offline};
 use common::reference::{self, Reference};
-use common::{arguments, exr_file, named_scene, picture, progress};
+use common::{arguments, environment_file, exr_file, named_scene, picture, progress};
 use lightfall::frame::{GiRenderer, Plan, Settings};
 use lightfall::reference::{PathComponent, PathEstimate, PathTracerSettings};
 use lightfall::scene::{Scene, SceneSummary};
@@ -62,7 +62,7 @@ enum Method {
 )]
 struct Arguments {
     /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, plane, furnace, two-rooms, pillars,
-    /// penumbra, living-room, colonnade, glass-sphere, ring-occluder, dimpled-mirror, water)
+    /// penumbra, living-room, colonnade, glass-sphere, ring-occluder, dimpled-mirror, water, courtyard)
     scene: String,
     /// Width in pixels
     #[arg(long, default_value_t = 512)]
@@ -88,6 +88,12 @@ struct Arguments {
     /// How indirect light is represented
     #[arg(long, value_enum, default_value = "splatting")]
     method: Method,
+    /// Light from all around, instead of the scene's own: an equirectangular .exr or .hdr file, or radiance R,G,B
+    #[arg(long, value_name = "FILE|R,G,B")]
+    environment: Option<String>,
+    /// Turns the environment, degrees, counter-clockwise seen from above
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    environment_rotation: f64,
     /// Any field of Settings, repeatable; an unknown key lists them all
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
@@ -395,7 +401,11 @@ fn load(arguments: &Arguments, time: f64) -> Result<Scene, String> {
     if !time.is_finite() {
         return Err("--time: expected a finite number of seconds".into());
     }
-    named_scene::load(&arguments.scene, time)
+    let mut scene = named_scene::load(&arguments.scene, time)?;
+    if let Some(environment) = &arguments.environment {
+        environment_file::add(&mut scene, environment, arguments.environment_rotation)?;
+    }
+    Ok(scene)
 }
 
 fn check_scene(arguments: &Arguments, scene: &Scene, summary: &SceneSummary) -> Result<(), String> {

@@ -12,8 +12,8 @@ use crate::pass::{
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
 use crate::resource::{
-    MAX_LIGHTS, Photon, PhotonMap, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, emission_cells, g_buffer,
-    lights, lost_rays, marked_pixels, mesh_geometry, photon_targets, view,
+    MAX_LIGHTS, Photon, PhotonMap, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, emission_cells, environment,
+    g_buffer, lights, lost_rays, marked_pixels, mesh_geometry, photon_targets, view,
 };
 use crate::wgsl;
 #[cfg(feature = "bvh")]
@@ -226,6 +226,7 @@ fn twins() -> Vec<Twin> {
             half_extent, first_photon, photon_count, density, disc_radius, extent, first_polygon,
             direct_polygons, polygon_count,
         }),
+        twin!(wgsl::COMPOSITE, "Environment", environment::gpu::Environment { radiance, rotation, size, _pad }),
         twin!(wgsl::DIRECT_LIGHT, "Polygon", lights::gpu::Polygon { corner, corners, u, until, v, area, radiance, _pad }),
         twin!(wgsl::PHOTON_EMITTER, "Photon", Photon {
             position, state, flux, density, normal, direction, reflectance, light_and_surface,

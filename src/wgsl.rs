@@ -514,6 +514,8 @@ pub(crate) const SPECULAR_PATHS_BEGIN: &str = compose![
 
 pub(crate) const SPECULAR_PATHS_ADVANCE: &str = compose![
     "pass/specular_paths/advance_paths.wgsl",
+    "common/environment.wgsl",
+    "common/environment_texel.wgsl",
     "pass/specular_paths/params.wgsl",
     "common/surface_rays.wgsl",
     "common/scatter.wgsl",
@@ -547,6 +549,8 @@ pub(crate) const SPECULAR_PATHS_ADVANCE: &str = compose![
 
 pub(crate) const COMPOSITE: &str = compose![
     "pass/composite.wgsl",
+    "common/environment.wgsl",
+    "common/environment_texel.wgsl",
     "common/lobe.wgsl",
     "common/full_screen.wgsl",
     "common/g_buffer.wgsl",
@@ -597,6 +601,7 @@ pub(crate) const PATH_TRACER: &str = compose![
     "reference/path_tracer/trace_paths.wgsl",
     "reference/path_tracer/emitters.wgsl",
     "reference/path_tracer/scatterer.wgsl",
+    "common/environment_texel.wgsl",
     "common/scatter.wgsl",
     "pass/bvh_tracer/bindings.wgsl",
     "common/bvh.wgsl",

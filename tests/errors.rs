@@ -9,7 +9,8 @@ use lightfall::resource::{
     Visibility,
 };
 use lightfall::scene::{
-    EmissiveTriangle, EnvironmentImage, Light, LightKind, Scene, SceneBounds, SceneSummary, UnitFrame, samples,
+    EmissiveTriangle, EnvironmentImage, Light, LightKind, LightSources, Scene, SceneBounds, SceneSummary, UnitFrame,
+    samples,
 };
 use lightfall::{Error, Timestamps, creation_count, wgpu};
 
@@ -480,9 +481,13 @@ fn counts_that_do_not_agree_are_named() {
         );
         let frame = UnitFrame::new(&SceneBounds::new(DVec3::ZERO, DVec3::ONE).unwrap(), 1.0).unwrap();
         let lights = vec![Light::point(DVec3::ZERO, 1.0, [1.0; 3]); MAX_LIGHTS + 1];
+        let sources = LightSources {
+            lights: &lights,
+            ..Default::default()
+        };
         let error = Lights::new(device)
             .unwrap()
-            .write(queue, &frame, &lights, &[], 10)
+            .write(queue, &frame, &sources, 10)
             .unwrap_err();
         assert!(matches!(error, Error::CountMismatch { .. }), "{error}");
     });

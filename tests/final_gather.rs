@@ -20,7 +20,7 @@ use lightfall::glam::{DAffine3, DVec3, Vec3};
 use lightfall::pass::*;
 use lightfall::resource::cube_face::CUBE_FACES;
 use lightfall::resource::*;
-use lightfall::scene::{Camera, Projection, SceneSummary, samples};
+use lightfall::scene::{Camera, LightSources, Projection, SceneSummary, samples};
 use lightfall::{Error, read_rgba32float_blocking, wgpu};
 
 /// Photons of hop 1 at these places of the room's walls, whose half extent is `half`, in the unit frame: for each wall,
@@ -57,7 +57,7 @@ fn light_maps(
 ) -> (EnvMapIrradiance, Vec<[f32; 4]>) {
     let Gpu { device, queue, .. } = bench.gpu;
     let mut lights = Lights::new(device).unwrap();
-    lights.write(queue, &bench.frame, &[], &[], 0).unwrap();
+    lights.write(queue, &bench.frame, &LightSources::default(), 0).unwrap();
     let shadow_maps = ShadowMaps::new(device, &bench.scene.lights, 4).unwrap();
     let irradiance = EnvMapIrradiance::new(device, &maps.maps, size).unwrap();
     let pass = EnvMapLighting::new(device, Kernel::Epanechnikov, false);

@@ -21,8 +21,8 @@ use lightfall::pass::{
     PhotonSplatterSettings,
 };
 use lightfall::resource::{
-    CapturePurpose, CaptureTargets, CaptureView, EnvMaps, GBuffer, GBufferViews, Geometry, Irradiance, MeshGeometry,
-    Photons, PrepareContext, Radiance, Subsampling,
+    CapturePurpose, CaptureTargets, CaptureView, EnvMaps, Environment, GBuffer, GBufferViews, Geometry, Irradiance,
+    MeshGeometry, Photons, PrepareContext, Radiance, Subsampling,
 };
 use lightfall::scene::{Instance, Light, Material, Mesh, Scene, SceneSummary};
 use lightfall::{read_buffer_blocking, read_rgba32float_blocking, wgpu};
@@ -362,6 +362,7 @@ fn an_engine_without_emission_gives_one_black_texel_and_the_composite_adds_nothi
         indirect: &indirect.irradiance,
         caustic: None,
         specular: None,
+        environment: &Environment::black(device).unwrap(),
         radiance: &radiance,
         settings: &CompositeSettings {
             output_scale: indirect.frame.output_scale(1.0).unwrap(),

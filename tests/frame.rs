@@ -11,7 +11,9 @@ use lightfall::frame::{
 use lightfall::glam::{DVec3, Vec3};
 use lightfall::pass::*;
 use lightfall::resource::*;
-use lightfall::scene::{EnvironmentImage, Light, LightKind, Material, Scene, SceneBounds, SceneSummary, samples};
+use lightfall::scene::{
+    EnvironmentImage, Light, LightKind, LightSources, Material, Scene, SceneBounds, SceneSummary, samples,
+};
 use lightfall::{creation_count, read_rgba32float_blocking, wgpu};
 use std::f64::consts::PI;
 
@@ -276,9 +278,11 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
     let frame = lightfall::scene::UnitFrame::new(&summary.bounds, summary.total_flux).unwrap();
     let mut geometry = MeshGeometry::new(device, queue, scene).unwrap();
     let mut lights = Lights::new(device).unwrap();
-    lights
-        .write(queue, &frame, &scene.lights, &[], settings.photons)
-        .unwrap();
+    let sources = LightSources {
+        lights: &scene.lights,
+        ..Default::default()
+    };
+    lights.write(queue, &frame, &sources, settings.photons).unwrap();
     let shadow_maps = ShadowMaps::new(device, &scene.lights, settings.shadow_map_size).unwrap();
     let mut env_maps = EnvMaps::new(device, settings.env_map_count, settings.env_map_size).unwrap();
     env_maps.set_centers(queue, centers).unwrap();
@@ -431,6 +435,7 @@ fn by_hand(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2], center
         indirect: &indirect,
         caustic: None,
         specular: None,
+        environment: &Environment::black(device).unwrap(),
         radiance: &radiance,
         settings: &CompositeSettings {
             output_scale: frame.output_scale(1.0).unwrap(),
@@ -616,14 +621,18 @@ fn rectangle_and_environment(scene: &mut Scene) -> [Light; 2] {
 }
 
 #[test]
-fn an_environment_alone_leaves_a_scene_black_and_the_plan_says_so() {
+fn an_environment_without_suns_leaves_a_scene_black_and_the_plan_says_so() {
     let Some(gpu) = gpu() else { return };
     let mut scene = samples::cornell(0.0);
     scene.lights = rectangle_and_environment(&mut scene)[1..].to_vec();
     scene.validate().unwrap();
     let summary = SceneSummary::of(&scene).unwrap();
     let radius = summary.bounds.radius();
-    let mut offline = Offline::new(&gpu, scene.clone(), &small(), 0, [16, 16], Component::All).unwrap();
+    let settings = Settings {
+        environment_suns: 0,
+        ..small()
+    };
+    let mut offline = Offline::new(&gpu, scene.clone(), &settings, 0, [16, 16], Component::All).unwrap();
     let before = creation_count().passes;
     offline.render_frame(None).unwrap();
     // G-buffer and composite only.
@@ -631,7 +640,7 @@ fn an_environment_alone_leaves_a_scene_black_and_the_plan_says_so() {
     assert!(offline.read().unwrap().iter().flatten().all(|&v| v == 0.0));
     let plan = offline.renderer.plan().unwrap().to_string();
     assert!(plan.contains("no light but an environment"), "{plan}");
-    assert!(plan.contains("the environment lights nothing yet"), "{plan}");
+    assert!(plan.contains("shines for the eye alone"), "{plan}");
     assert!(offline.renderer.shadow_maps().is_none() && offline.renderer.photons().is_none());
     // The unit of flux is near what it emits all the same, image and all.
     let means = [0.625, 0.75, 2.0];
@@ -643,7 +652,7 @@ fn an_environment_alone_leaves_a_scene_black_and_the_plan_says_so() {
 }
 
 #[test]
-fn an_environment_among_other_lights_changes_no_bit() {
+fn an_environment_without_suns_among_other_lights_changes_no_bit() {
     let Some(gpu) = gpu() else { return };
     let at = DVec3::new(2.78, 5.0, 2.795);
     let spot = |outer_angle: f64, radius| LightKind::Spot {
@@ -673,7 +682,11 @@ fn an_environment_among_other_lights_changes_no_bit() {
             ..Light::point(at, 10.0, [1.0, 0.8, 0.6])
         })
         .to_vec();
-    let render = |scene: &Scene| offline::render(&gpu, scene, &small(), [32, 32], Component::All).unwrap();
+    let settings = Settings {
+        environment_suns: 0,
+        ..small()
+    };
+    let render = |scene: &Scene| offline::render(&gpu, scene, &settings, [32, 32], Component::All).unwrap();
     let reference = render(&scene);
     assert!(mean(&reference, 32, 1, |_, _| true) > 0.0);
     let [_, environment] = rectangle_and_environment(&mut scene);

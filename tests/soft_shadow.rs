@@ -8,7 +8,8 @@ use lightfall::glam::{DAffine3, DVec3};
 use lightfall::pass::*;
 use lightfall::resource::*;
 use lightfall::scene::{
-    Camera, Instance, Light, LightKind, Material, Mesh, Projection, Scene, SceneSummary, UnitFrame, samples,
+    Camera, Instance, Light, LightKind, LightSources, Material, Mesh, Projection, Scene, SceneSummary, UnitFrame,
+    samples,
 };
 use lightfall::{creation_count, read_buffer_blocking, wgpu};
 use std::f64::consts::{PI, TAU};
@@ -114,7 +115,11 @@ fn render_by(
     let mut geometry = MeshGeometry::new(device, queue, scene).unwrap();
     let shadow_maps = ShadowMaps::new(device, &scene.lights, map_size).unwrap();
     let mut lights = Lights::new(device).unwrap();
-    lights.write(queue, &frame, &scene.lights, &[], 0).unwrap();
+    let sources = LightSources {
+        lights: &scene.lights,
+        ..Default::default()
+    };
+    lights.write(queue, &frame, &sources, 0).unwrap();
     let mut camera = CameraView::new(&frame, &scene.cameras[0], size, [0.0; 2]);
     let mut views = vec![camera.capture];
     views.extend(shadow_maps.views(&frame, &scene.lights));

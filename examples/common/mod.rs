@@ -8,6 +8,7 @@ pub(crate) mod clock;
 pub(crate) mod contact_sheet;
 #[cfg(feature = "reference")]
 pub(crate) mod difference;
+pub(crate) mod environment_file;
 pub(crate) mod exr_file;
 pub(crate) mod gltf_scene;
 pub(crate) mod lettering;

@@ -61,6 +61,7 @@ impl<'a> Offline<'a> {
         let bvh = settings.tracer_kind.uses_triangles().then(bvh).transpose()?;
         let mut renderer = GiRenderer::new(device, settings)?;
         let summary = SceneSummary::of(&scene)?;
+        renderer.set_environment(queue, scene.environments.first())?;
         renderer.set_scene(queue, &summary, &scene.lights)?;
         renderer.place_env_maps_blocking(queue, &mut geometry)?;
         let weight = |on: bool| if on { 1.0 } else { 0.0 };
@@ -168,6 +169,10 @@ impl<'a> Offline<'a> {
             }
         }
         self.summary = SceneSummary::of(&scene)?;
+        if scene.environments != self.scene.environments {
+            self.renderer
+                .set_environment(&self.gpu.queue, scene.environments.first())?;
+        }
         self.scene = scene;
         self.renderer.geometry_changed();
         Ok(())

@@ -11,7 +11,7 @@ struct Light {
     kind: u32,
     // Unit axis along which the light looks
     direction: vec3f,
-    // 1 - cos of the spot's inner half angle; area: 1 if all of it lies in one plane
+    // 1 - cos of the spot's inner half angle; area: 1 if all of it lies in one plane; directional: LIGHT_OF_ENVIRONMENT or not
     inner: f32,
     // Radiant intensity, irradiance on a perpendicular plane (directional), or mean radiance (area)
     intensity: vec3f,
@@ -44,6 +44,14 @@ struct LightRay {
     direction: vec3f,
     layer: u32,
     uv: vec2f,
+}
+
+// A sun that stands for a part of the environment.
+const LIGHT_OF_ENVIRONMENT: f32 = 0.0;
+
+// Whether rays can run into it, or into what it stands for.
+fn light_is_met(light: Light) -> bool {
+    return light.kind == LIGHT_AREA || (light.kind == LIGHT_DIRECTIONAL && light.inner == LIGHT_OF_ENVIRONMENT);
 }
 
 fn light_layer_uv(x: f32, y: f32) -> vec2f {

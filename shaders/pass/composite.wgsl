@@ -1,5 +1,5 @@
 // Outgoing radiance: emitted + reflectance / pi * (direct + indirect + caustic irradiance), or of a specular surface what is seen
-// in it, scaled back to world units.
+// in it, scaled back to world units; where no surface is seen, the environment.
 
 struct Params {
     // Radiance per unit-frame radiance, times pre-exposure
@@ -23,8 +23,18 @@ struct Params {
 @group(0) @binding(6) var caustic_irradiance: texture_2d<f32>;
 @group(0) @binding(7) var surface_texture: texture_2d<u32>;
 @group(0) @binding(8) var specular_radiance: texture_2d<f32>;
+@group(0) @binding(9) var<uniform> environment: Environment;
+@group(0) @binding(10) var environment_image: texture_2d<f32>;
 
 const INVERSE_PI: f32 = 0.318309886;
+
+// Along which the eye looks through a pixel.
+fn view_direction(pixel: vec2f) -> vec3f {
+    if view.eye.w == 0.0 {
+        return view.eye.xyz;
+    }
+    return normalize(g_buffer_position(view, pixel, 0.5) - view.eye.xyz);
+}
 
 @fragment
 fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
@@ -32,7 +42,7 @@ fn fragment(@builtin(position) position: vec4f) -> @location(0) vec4f {
     let pixel = at + view.origin;
     let base_color = textureLoad(base_color_texture, pixel, 0);
     if base_color.a <= 0.0 {
-        return vec4f(0.0);
+        return vec4f(environment_radiance(view_direction(vec2f(at))) * (params.emission_weight * params.output_scale), 0.0);
     }
     let direct = textureLoad(direct_irradiance, at, 0).rgb * params.direct_weight;
     let indirect = textureLoad(indirect_irradiance, at, 0).rgb * params.indirect_weight;

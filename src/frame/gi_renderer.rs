@@ -23,12 +23,13 @@ use crate::pass::{
 #[cfg(feature = "bvh")]
 use crate::resource::BvhGeometry;
 use crate::resource::{
-    CameraView, CapturePurpose, CaptureView, DepthHierarchy, EmissionCells, EnvMapIrradiance, EnvMaps, GBuffer,
-    Geometry, Irradiance, Lights, MAX_LIGHTS, MarkedPixels, NearestOccluders, Photons, PrepareContext, Radiance,
-    ShadowMaps, Visibility,
+    CameraView, CapturePurpose, CaptureView, DepthHierarchy, EmissionCells, EnvMapIrradiance, EnvMaps, Environment,
+    GBuffer, Geometry, Irradiance, Lights, MAX_LIGHTS, MarkedPixels, NearestOccluders, Photons, PrepareContext,
+    Radiance, ShadowMaps, Visibility,
 };
 use crate::scene::{
-    Camera, EmissiveTriangle, Lamp, Light, LightKind, Projection, SceneBounds, SceneSummary, UnitFrame,
+    Camera, EmissiveTriangle, EnvironmentImage, Lamp, Light, LightKind, LightSources, Projection, SceneBounds,
+    SceneSummary, Sun, UnitFrame,
 };
 use crate::{Error, Timestamps};
 use glam::DVec3;
@@ -42,10 +43,13 @@ pub struct GiRenderer {
     settings: Settings,
     passes: Passes,
     black: Irradiance,
+    environment: Environment,
+    environment_image: Option<EnvironmentImage>,
     direct: Option<DirectScene>,
     indirect: Option<IndirectScene>,
     state: Option<SceneState>,
     lamp_cache: Option<LampCache>,
+    sun_cache: Option<SunCache>,
     placement: EnvMapPlacement,
     /// Changes whenever a resource that views bind is made anew; no two renderers share one.
     generation: u64,
@@ -85,8 +89,9 @@ struct Passes {
 struct SceneState {
     frame: UnitFrame,
     plan: Plan,
-    /// Those given, and behind them those that stand for lamps.
+    /// Those given, and behind them those that stand for the environment, and for lamps.
     lights: Vec<Light>,
+    suns: Vec<Light>,
     lamps: Vec<Lamp>,
     region: SceneBounds,
     /// Of all surfaces, unit frame.
@@ -102,6 +107,14 @@ struct LampCache {
     triangles: Vec<EmissiveTriangle>,
     most: usize,
     lamps: Vec<Lamp>,
+}
+
+/// The environment in parts, and what they were last made of.
+#[derive(Debug)]
+struct SunCache {
+    has_image: bool,
+    most: usize,
+    suns: Vec<Sun>,
 }
 
 /// Allocated while anything shines.
@@ -207,10 +220,13 @@ impl GiRenderer {
             settings: settings.clone(),
             passes,
             black: Irradiance::new(device, [1, 1], wgpu::TextureFormat::Rgba32Float)?,
+            environment: Environment::black(device)?,
+            environment_image: None,
             direct: None,
             indirect: None,
             state: None,
             lamp_cache: None,
+            sun_cache: None,
             placement: EnvMapPlacement::default(),
             generation: next_generation(),
             revision: 0,
@@ -226,12 +242,29 @@ impl GiRenderer {
         })
     }
 
+    /// Gives the image that an environment light refers to, [`LightKind::Environment`]; `None` drops it. Uploads it, and divides it
+    /// into suns with the next `set_scene`: call it when the image changes, not every frame.
+    ///
+    /// # Errors
+    /// As [`EnvironmentImage::validate`]; [`Error::LimitExceeded`] for one that is larger than a texture may be. The old one stays
+    /// then.
+    pub fn set_environment(&mut self, queue: &wgpu::Queue, image: Option<&EnvironmentImage>) -> Result<(), Error> {
+        self.environment = match image {
+            Some(image) => Environment::new(&self.device, queue, image)?,
+            None => Environment::black(&self.device)?,
+        };
+        self.environment_image = image.cloned();
+        self.sun_cache = None;
+        self.revision += 1;
+        Ok(())
+    }
+
     /// Says what the scene is this frame: plans the stages, keeps or renews the unit frame, uploads the lights, allocates
     /// what newly became necessary and drops what no longer is. Returns the frame for building views.
     ///
     /// # Errors
     /// [`Error::InvalidBounds`], [`Error::InvalidScene`] for a bad light, [`Error::CountMismatch`] for too many of them,
-    /// [`Error::LimitExceeded`].
+    /// [`Error::LimitExceeded`]; [`Error::MissingInput`] for an environment light that refers to an image while none is given.
     pub fn set_scene(
         &mut self,
         queue: &wgpu::Queue,
@@ -243,8 +276,14 @@ impl GiRenderer {
             light.validate(index)?;
         }
         summary.validate(lights)?;
-        let lamps = self.lamps(summary, lights)?;
-        let sources = Lamp::with_lights(lights, &lamps);
+        let suns = self.suns(summary, lights)?;
+        let lamps = self.lamps(summary, lights, &suns)?;
+        let sources = LightSources {
+            lights,
+            suns: &suns,
+            lamps: &lamps,
+        };
+        let sources = sources.all();
         let frame = match &self.state {
             Some(state) => state.frame.follow(&summary.bounds, summary.total_flux)?,
             None => UnitFrame::new(&summary.bounds, summary.total_flux)?,
@@ -268,15 +307,21 @@ impl GiRenderer {
             frame,
             plan,
             lights: sources,
+            suns,
             lamps,
             region: summary.bounds,
             area: frame.area(summary.area),
         });
         if let Some(state) = &self.state {
+            let environment = lights.iter().find(|l| l.is_environment());
+            self.environment.write(queue, &frame, environment);
             if let Some(direct) = &mut self.direct {
-                direct
-                    .lights
-                    .write(queue, &frame, lights, &state.lamps, self.settings.photons)?;
+                let sources = LightSources {
+                    lights,
+                    suns: &state.suns,
+                    lamps: &state.lamps,
+                };
+                direct.lights.write(queue, &frame, &sources, self.settings.photons)?;
             }
             if let (Some(direct), Some(indirect)) = (&self.direct, &mut self.indirect) {
                 indirect.aim_caustics(queue, &frame, &direct.lights, &summary.specular_bounds);
@@ -289,15 +334,51 @@ impl GiRenderer {
         Ok(frame)
     }
 
-    /// As many as there is room for beside the lights, grouped anew where their triangles have changed.
-    fn lamps(&mut self, summary: &SceneSummary, lights: &[Light]) -> Result<Vec<Lamp>, Error> {
+    /// What stands for the environment: as many suns as the settings want and there is room for beside the lights and one lamp.
+    fn suns(&mut self, summary: &SceneSummary, lights: &[Light]) -> Result<Vec<Light>, Error> {
+        let environment = lights.iter().find_map(|light| match light.kind {
+            LightKind::Environment { image, rotation } => Some((light, image, rotation)),
+            _ => None,
+        });
+        let Some((light, image, rotation)) = environment else {
+            return Ok(Vec::new());
+        };
+        let image = match (image, &self.environment_image) {
+            (None, _) => None,
+            (Some(_), Some(image)) => Some(image),
+            (Some(_), None) => {
+                return Err(Error::MissingInput {
+                    stage: "DirectLight",
+                    input: "an environment's image",
+                    remedy: "hand it to GiRenderer::set_environment, or take LightKind::Environment { image: None, .. }",
+                });
+            }
+        };
+        let lamps = usize::from(!summary.emissive_triangles.is_empty());
+        let others = lights.iter().filter(|l| !l.is_environment()).count() + lamps;
+        let layers = ShadowMaps::layers(lights) as usize + 6 * lamps + 1;
+        let most = (self.settings.environment_suns as usize)
+            .min(MAX_LIGHTS.saturating_sub(others))
+            .min((self.device.limits().max_texture_array_layers as usize).saturating_sub(layers));
+        let has_image = image.is_some();
+        let is_known = |c: &&SunCache| c.most == most && c.has_image == has_image;
+        if self.sun_cache.as_ref().filter(is_known).is_none() {
+            let suns = Sun::divide(image, most);
+            self.sun_cache = Some(SunCache { has_image, most, suns });
+        }
+        let suns = self.sun_cache.iter().flat_map(|c| &c.suns);
+        Ok(suns.map(|s| s.light(light.strength(), rotation)).collect())
+    }
+
+    /// As many as there is room for beside the other lights, grouped anew where their triangles have changed.
+    fn lamps(&mut self, summary: &SceneSummary, lights: &[Light], suns: &[Light]) -> Result<Vec<Lamp>, Error> {
         if summary.emissive_triangles.is_empty() {
             self.lamp_cache = None;
             return Ok(Vec::new());
         }
-        let others = lights.iter().filter(|l| !l.is_environment()).count();
+        let others = lights.iter().filter(|l| !l.is_environment()).count() + suns.len();
         let layers = self.device.limits().max_texture_array_layers;
-        let free_layers = layers.saturating_sub(1 + ShadowMaps::layers(lights));
+        let free_layers = layers.saturating_sub(1 + ShadowMaps::layers(lights) + ShadowMaps::layers(suns));
         let most = MOST_LAMPS
             .min(free_layers as usize / 6)
             .min(MAX_LIGHTS.saturating_sub(others));
@@ -771,7 +852,7 @@ impl GiRenderer {
                 caustic.record(encoder, &indirect_inputs);
             }
             if let Some(specular) = &mut resources.specular {
-                specular.record(encoder, &indirect_inputs, &direct.shadow_maps)?;
+                specular.record(encoder, &indirect_inputs, &direct.shadow_maps, &self.environment)?;
             }
         }
         let composite_inputs = CompositeInputs {
@@ -784,6 +865,7 @@ impl GiRenderer {
                 .map_or(&self.black, IndirectView::irradiance),
             caustic: resources.caustic.as_ref().map(CausticView::irradiance),
             specular: resources.specular.as_ref().map(SpecularView::radiance),
+            environment: &self.environment,
             radiance: &resources.radiance,
             settings: inputs.composite,
             timestamps: inputs.timestamps,
@@ -923,7 +1005,10 @@ impl GiRenderer {
 
     /// Bytes that all views share, by resource.
     pub fn memory_by_resource(&self) -> Vec<(&'static str, u64)> {
-        let mut list = vec![("black", self.black.memory_use())];
+        let mut list = vec![
+            ("black", self.black.memory_use()),
+            ("environment", self.environment.memory_use()),
+        ];
         if let Some(direct) = &self.direct {
             list.push(("lights", direct.lights.memory_use()));
             list.push((

@@ -83,9 +83,12 @@ pub struct Plan {
 impl Plan {
     /// Decides from what is in the scene and what the settings allow.
     pub fn for_scene(summary: &SceneSummary, settings: &Settings) -> Self {
-        let lit = match summary.is_lit() {
+        let lit = match is_lit(summary, settings) {
             false => (false, no_light(summary).to_owned()),
-            true => (true, sources(summary.lights - summary.environment_lights, summary)),
+            true => (
+                true,
+                sources(summary.lights - summary.environment_lights, summary, settings),
+            ),
         };
         let indirect = indirect(summary, settings);
         let specular: Vec<_> = summary.metals.iter().chain(&summary.dielectrics).cloned().collect();
@@ -95,10 +98,14 @@ impl Plan {
             (true, false) => (true, format!("seen in or through {}", specular.join(", "))),
         };
         let caustics = caustics(&specular, summary, settings);
-        let has_extent = summary.lights_with_extent > 0 || !summary.emissive_triangles.is_empty();
+        let has_surfaces = suns(summary, settings) > 0 || !summary.emissive_triangles.is_empty();
+        let has_extent = summary.lights_with_extent > 0 || has_surfaces;
         let soft = match has_extent {
             false => "no light has an extent".to_owned(),
-            true => format!("{} with an extent", sources(summary.lights_with_extent, summary)),
+            true => format!(
+                "{} with an extent",
+                sources(summary.lights_with_extent, summary, settings)
+            ),
         };
         let soft = (lit.0 && has_extent, soft);
         let stage = |stage, (on, reason): (bool, String)| PlannedStage { stage, on, reason };
@@ -145,26 +152,44 @@ impl Plan {
     }
 }
 
-/// So many lights, and the surfaces that shine.
-fn sources(lights: usize, summary: &SceneSummary) -> String {
-    match (lights, summary.emissive_triangles.len()) {
-        (_, 0) => format!("{lights} light(s)"),
-        (0, n) => format!("{n} emissive triangle(s)"),
-        (_, n) => format!("{lights} light(s), {n} emissive triangle(s)"),
+/// Whether anything shines on surfaces.
+fn is_lit(summary: &SceneSummary, settings: &Settings) -> bool {
+    let has_lights = summary.lights > summary.environment_lights || suns(summary, settings) > 0;
+    has_lights || !summary.emissive_triangles.is_empty()
+}
+
+/// How many suns stand for the environment, at most.
+fn suns(summary: &SceneSummary, settings: &Settings) -> u32 {
+    if summary.environment_lights > 0 {
+        settings.environment_suns
+    } else {
+        0
     }
+}
+
+/// So many lights, the suns of an environment, and the surfaces that shine.
+fn sources(lights: usize, summary: &SceneSummary, settings: &Settings) -> String {
+    let counted = [
+        (lights, "light(s)"),
+        (suns(summary, settings) as usize, "sun(s) of the environment"),
+        (summary.emissive_triangles.len(), "emissive triangle(s)"),
+    ];
+    let named = counted.iter().filter(|(n, _)| *n > 0);
+    let named: Vec<_> = named.map(|(n, what)| format!("{n} {what}")).collect();
+    named.join(", ")
 }
 
 /// Why nothing is lit.
 fn no_light(summary: &SceneSummary) -> &'static str {
     match summary.lights {
         0 => "no light",
-        _ => "no light but an environment",
+        _ => "no light but an environment, and settings give it no suns",
     }
 }
 
 fn indirect(summary: &SceneSummary, settings: &Settings) -> (bool, String) {
     let off = |reason: &str| (false, reason.to_owned());
-    if !summary.is_lit() {
+    if !is_lit(summary, settings) {
         off(no_light(summary))
     } else if !summary.has_reflecting_surfaces {
         off("every surface is black")
@@ -297,8 +322,10 @@ fn simplifications(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
             summary.emissive_triangles.len()
         ));
     }
-    if summary.environment_lights > 0 {
-        notes.push("the environment lights nothing yet".to_owned());
+    match (summary.environment_lights, settings.environment_suns) {
+        (0, _) => {}
+        (_, 0) => notes.push("the environment shines for the eye alone".to_owned()),
+        (_, suns) => notes.push(format!("the environment gives the light of at most {suns} suns")),
     }
     if summary.lights_with_extent > 0 {
         notes.push(format!(
@@ -414,9 +441,12 @@ mod tests {
     }
 
     #[test]
-    fn environments_are_named_and_switch_no_stage_on() {
-        let settings = Settings::balanced();
-        let plan = |lights, environment_lights| {
+    fn environments_light_by_as_many_suns_as_settings_give_them() {
+        let plan = |lights, environment_lights, environment_suns| {
+            let settings = Settings {
+                environment_suns,
+                ..Settings::balanced()
+            };
             let summary = SceneSummary {
                 lights,
                 environment_lights,
@@ -424,12 +454,20 @@ mod tests {
             };
             Plan::for_scene(&summary, &settings)
         };
-        let (dark, one, mixed) = (plan(0, 0), plan(1, 0), plan(2, 1));
+        let (dark, one) = (plan(0, 0, 9), plan(1, 0, 9));
         let on = |plan: &Plan| plan.stages.iter().map(|s| s.on).collect::<Vec<_>>();
-        assert_eq!(on(&plan(1, 1)), on(&dark));
-        assert_eq!(mixed.stages, one.stages);
-        assert!(mixed.to_string().contains("the environment lights nothing yet"));
-        assert!(plan(1, 1).to_string().contains("no light but an environment"));
+        assert_eq!(on(&plan(1, 1, 0)), on(&dark));
+        assert_eq!(plan(2, 1, 0).stages, one.stages);
+        assert!(plan(1, 1, 0).to_string().contains("no light but an environment"));
+        assert!(plan(2, 1, 0).to_string().contains("shines for the eye alone"));
+        let lit = plan(1, 1, 9);
+        assert!(
+            [Stage::DirectLight, Stage::SoftShadow, Stage::PhotonEmitter]
+                .iter()
+                .all(|&s| lit.is_on(s))
+        );
+        assert!(lit.to_string().contains("9 sun(s) of the environment"), "{lit}");
+        assert!(lit.to_string().contains("at most 9 suns"), "{lit}");
         assert!(one.simplifications.is_empty());
     }
 

@@ -11,6 +11,9 @@ use crate::resource::Subsampling;
 /// Most scatterings of a path.
 const MAX_BOUNCES: u32 = 64;
 
+/// Most suns that stand for an environment: lights and lamps want room too.
+const MOST_SUNS: u32 = 48;
+
 /// Most candidates for environment maps.
 const MAX_CANDIDATES: u32 = EnvMapSelectorResources::MAX_CANDIDATES;
 
@@ -135,6 +138,9 @@ pub struct Settings {
     /// Texels along a face of an environment map. Finer resolves thinner things and costs memory and capture time as the
     /// square.
     pub env_map_size: u32,
+    /// Suns that stand for an environment, 0 to 48, as parallel lights with an extent. More are nearer to its true light; each costs
+    /// a shadow map and a search for penumbrae. 0: it shines for the eye alone.
+    pub environment_suns: u32,
     /// Texels along a layer of a shadow map. Finer sharpens shadow edges, direct and in first hits; costs as the square.
     pub shadow_map_size: u32,
     /// How penumbrae of lights with an extent are gathered.
@@ -195,6 +201,7 @@ impl Settings {
             emission_importance: 0.0,
             env_map_count: 12,
             env_map_size: 64,
+            environment_suns: 8,
             shadow_map_size: 256,
             selector: EnvMapSelectorSettings {
                 candidates: 40,
@@ -228,6 +235,7 @@ impl Settings {
             env_map_count: 12,
             env_maps_at_lights: 0,
             env_map_size: 128,
+            environment_suns: 16,
             shadow_map_size: 512,
             soft_shadow: SoftShadowSettings::default(),
             selector: EnvMapSelectorSettings::default(),
@@ -264,6 +272,7 @@ impl Settings {
             emission_importance: 0.0,
             env_map_count: 16,
             env_map_size: 256,
+            environment_suns: 32,
             shadow_map_size: 1024,
             selector: EnvMapSelectorSettings {
                 coverage_target: 1.0,
@@ -452,6 +461,7 @@ const KNOBS: &[Knob] = &[
         .contains(&v)),
     field!("env_maps.at_lights", "0 to 8", env_maps_at_lights, |v| v <= 8),
     field!("env_maps.size", "4 to 8192", env_map_size, |v| (4..=8192).contains(&v)),
+    field!("environment.suns", "0 to 48", environment_suns, |v| v <= MOST_SUNS),
     field!("shadow_maps.size", "4 to 8192", shadow_map_size, |v| (4..=8192)
         .contains(&v)),
     choice!(

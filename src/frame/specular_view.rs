@@ -3,7 +3,7 @@
 use super::indirect_view::{IndirectViewInputs, MOST_RAYS, RayTracers, ViewTracers};
 use crate::Error;
 use crate::pass::{PathShape, SpecularPathsInputs, SpecularPathsResources};
-use crate::resource::{Irradiance, ShadowMaps, SurfaceRays};
+use crate::resource::{Environment, Irradiance, ShadowMaps, SurfaceRays};
 
 /// Allocated while anything specular may be in view.
 #[derive(Debug)]
@@ -42,6 +42,7 @@ impl SpecularView {
         encoder: &mut wgpu::CommandEncoder,
         inputs: &IndirectViewInputs<'_>,
         shadow_maps: &ShadowMaps,
+        environment: &Environment,
     ) -> Result<(), Error> {
         let Some(photons) = inputs.scene.photon_grid() else {
             return Ok(());
@@ -55,6 +56,7 @@ impl SpecularView {
             photons,
             lights: inputs.lights,
             shadow_maps,
+            environment,
             radiance: &self.radiance,
             weights: [inputs.view.composite.direct, inputs.view.composite.indirect],
             sample_offset: inputs.sample_offset,

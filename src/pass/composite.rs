@@ -1,13 +1,14 @@
 //! Puts light together: L = L_e + ρ/π · (E_direct + E_indirect + E_caustic), or of specular surfaces what is seen in them, scaled back to
 //! world units.
 //!
-//! Inputs: [`GBuffer`], two or three [`Irradiance`]s, and what [`SpecularPaths`](super::SpecularPaths) gives. Output: [`Radiance`]. Cost: one full-screen pass. Source: Larsen 2004,
+//! Inputs: [`GBuffer`], two or three [`Irradiance`]s, what [`SpecularPaths`](super::SpecularPaths) gives, and the [`Environment`].
+//! Output: [`Radiance`]. Cost: one full-screen pass. Source: Larsen 2004,
 //! chapter 13; the 1/π that is missing from Yao et al., soft shadows and image-space photon mapping, Eq. 1. Limits: a
 //! surface is either Lambertian or specular.
 
 use super::full_screen::{FullScreen, FullScreenResources};
 use crate::gpu::Slot;
-use crate::resource::{GBuffer, Irradiance, Radiance};
+use crate::resource::{Environment, GBuffer, Irradiance, Radiance};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -28,7 +29,7 @@ pub(crate) mod gpu {
 }
 
 /// Bindings of `shaders/pass/composite.wgsl`, in order.
-pub(crate) const SLOTS: [Slot; 9] = [
+pub(crate) const SLOTS: [Slot; 11] = [
     Slot::Uniform,
     Slot::Uniform,
     Slot::Texture,
@@ -37,6 +38,8 @@ pub(crate) const SLOTS: [Slot; 9] = [
     Slot::Texture,
     Slot::Texture,
     Slot::UintTexture,
+    Slot::Texture,
+    Slot::Uniform,
     Slot::Texture,
 ];
 
@@ -52,7 +55,7 @@ pub struct CompositeSettings {
     pub indirect: f32,
     /// Factor of caustics, where these are apart from other indirect light.
     pub caustic: f32,
-    /// Factor of emission.
+    /// Factor of emission, and of the environment where no surface is seen.
     pub emission: f32,
     /// Factor of what diffuse surfaces reflect; 0 leaves what is seen in metal and glass.
     pub diffuse: f32,
@@ -98,6 +101,8 @@ pub struct CompositeInputs<'a> {
     pub caustic: Option<&'a Irradiance>,
     /// Radiance of specular surfaces, unit frame; `None`: they are taken for diffuse ones.
     pub specular: Option<&'a Irradiance>,
+    /// What is seen where no surface is.
+    pub environment: &'a Environment,
     /// Written; of the format that the pass was made for.
     pub radiance: &'a Radiance,
     /// What to show.
@@ -143,6 +148,8 @@ impl Composite {
             inputs.caustic.unwrap_or(inputs.indirect).view().into(),
             inputs.g_buffer.surfaces().into(),
             inputs.specular.unwrap_or(inputs.direct).view().into(),
+            inputs.environment.buffer().into(),
+            inputs.environment.view().into(),
         ];
         let targets = [inputs.radiance.view()];
         self.pass

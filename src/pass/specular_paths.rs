@@ -1,7 +1,8 @@
 //! What the eye sees in mirrors and through glass: paths over specular surfaces, up to the first diffuse one.
 //!
 //! Inputs: [`GBuffer`] with lobes among its surfaces; what a tracer says of the [`SurfaceRays`] that each step writes;
-//! [`PhotonGridResources`], [`Lights`] and [`ShadowMaps`] for the light where paths end. Output: radiance, as an [`Irradiance`]
+//! [`PhotonGridResources`], [`Lights`] and [`ShadowMaps`] for the light where paths end, the [`Environment`] where they meet
+//! nothing. Output: radiance, as an [`Irradiance`]
 //! (`rgba32float`, unit frame): of pixels whose surface is specular, zero of all others. Sources: Whitted 1980; Jensen 1996, for
 //! paths that end in a photon map; Walter et al. 2007 and Heitz 2018 for rough surfaces.
 //!
@@ -15,7 +16,7 @@
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::pass::{Kernel, PhotonGridResources};
-use crate::resource::{GBuffer, Irradiance, Lights, ShadowMaps, SurfaceRays};
+use crate::resource::{Environment, GBuffer, Irradiance, Lights, ShadowMaps, SurfaceRays};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -66,7 +67,7 @@ pub(crate) const BEGIN_SLOTS: [Slot; 11] = [
 ];
 
 /// Bindings of `shaders/pass/specular_paths/advance_paths.wgsl`, in order.
-pub(crate) const ADVANCE_SLOTS: [Slot; 11] = [
+pub(crate) const ADVANCE_SLOTS: [Slot; 13] = [
     Slot::Uniform,
     Slot::StorageMut,
     Slot::Storage,
@@ -78,6 +79,8 @@ pub(crate) const ADVANCE_SLOTS: [Slot; 11] = [
     Slot::Storage,
     Slot::UintArray,
     Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
+    Slot::Uniform,
+    Slot::Texture,
 ];
 
 /// The pass.
@@ -129,6 +132,8 @@ pub struct SpecularPathsInputs<'a> {
     pub lights: &'a Lights,
     /// What lights see.
     pub shadow_maps: &'a ShadowMaps,
+    /// What rays see that meet no surface.
+    pub environment: &'a Environment,
     /// Written by the last step; `rgba32float` of the G-buffer's size.
     pub radiance: &'a Irradiance,
     /// Factors of light straight from a source, by way of the surface that the eye sees alone, and of all other light.
@@ -259,6 +264,8 @@ impl SpecularPaths {
             inputs.lights.polygons().into(),
             inputs.shadow_maps.view().into(),
             inputs.radiance.view().into(),
+            inputs.environment.buffer().into(),
+            inputs.environment.view().into(),
         ];
         let label = "lightfall::SpecularPaths";
         let cache = &mut resources.advance_groups;

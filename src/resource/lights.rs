@@ -2,11 +2,11 @@
 
 use super::ShadowMaps;
 use super::view::axes_along;
-use crate::scene::{EmissiveTriangle, Lamp, Light, LightKind, UnitFrame};
+use crate::scene::{EmissiveTriangle, Lamp, Light, LightKind, LightSources, UnitFrame};
 use crate::{Error, gpu as device};
 use glam::{DVec3, Vec3};
 
-/// Most lights a scene may have, lamps of emissive triangles counted and environments not.
+/// Most lights a scene may have, suns of an environment and lamps of emissive triangles counted, environments not.
 pub const MAX_LIGHTS: usize = 64;
 
 /// Share of the photon budget that is spread evenly, so that a dim lamp in a dark corner is not starved; the rest goes
@@ -18,6 +18,9 @@ pub const MAX_DIRECT_POLYGONS: usize = 16;
 
 /// Shadow maps of flat lamps are taken from this far before them, in their extents, so that they do not see their own edges.
 const BEFORE_LAMP: f64 = 1.0 / 1024.0;
+
+/// `LightRecord::inner` of suns that stand for a part of the environment, which rays can meet. Twin of `LIGHT_OF_ENVIRONMENT`.
+const OF_ENVIRONMENT: f32 = 0.0;
 
 /// Cosine up to which triangles lie in one plane.
 const FLAT: f64 = 0.9999;
@@ -75,8 +78,8 @@ pub(crate) mod gpu {
     }
 }
 
-/// All lights of a frame but environments, in their order, and behind them lamps made of emissive triangles: an `array<Light>`
-/// of `shaders/common/light.wgsl`, intensities in the unit frame, and the polygons of those that are flat.
+/// All [`LightSources`] of a frame but environments, in their order: an `array<Light>` of `shaders/common/light.wgsl`,
+/// intensities in the unit frame, and the polygons of those that are flat.
 #[derive(Debug)]
 pub struct Lights {
     device: wgpu::Device,
@@ -103,30 +106,31 @@ impl Lights {
         })
     }
 
-    /// Uploads this frame's lights, environments left out, and its lamps. `photon_count` photons are divided among them: three
-    /// quarters in proportion to flux, one quarter evenly among those that shine. Shadow-map layers are numbered as
-    /// [`ShadowMaps`] does for [`Lamp::with_lights`].
+    /// Uploads what lights this frame. `photon_count` photons are divided among them: three quarters in proportion to flux, one
+    /// quarter evenly among those that shine. Shadow-map layers are numbered as [`ShadowMaps`] does for
+    /// [`LightSources::all`].
     ///
     /// # Errors
-    /// [`Error::CountMismatch`] above [`MAX_LIGHTS`] lights and lamps; [`Error::LimitExceeded`] for more triangles than a
-    /// storage buffer holds.
+    /// [`Error::CountMismatch`] above [`MAX_LIGHTS`] of them; [`Error::LimitExceeded`] for more triangles than a storage buffer
+    /// holds.
     pub fn write(
         &mut self,
         queue: &wgpu::Queue,
         frame: &UnitFrame,
-        lights: &[Light],
-        lamps: &[Lamp],
+        sources: &LightSources<'_>,
         photon_count: u32,
     ) -> Result<(), Error> {
-        let found = lights.iter().filter(|l| !l.is_environment()).count() + lamps.len();
+        let found = sources.count();
         if found > MAX_LIGHTS {
             return Err(Error::CountMismatch {
-                what: "lights that are no environments, and lamps (most a scene may have)",
+                what: "lights that are no environments, suns of these, and lamps (most a scene may have)",
                 expected: MAX_LIGHTS,
                 found,
             });
         }
-        let all = Lamp::with_lights(lights, lamps);
+        let all = sources.all();
+        let suns_from = sources.lights.len();
+        let lamps_from = suns_from + sources.suns.len();
         let counts = divide_photons(&fluxes(frame, &all), photon_count);
         let (mut records, mut polygons) = (Vec::with_capacity(found), Vec::new());
         let (mut first_layer, mut first_photon) = (0, 0);
@@ -135,8 +139,11 @@ impl Lights {
                 continue;
             };
             if let LightKind::Rectangle { .. } = light.kind {
-                let lamp = index.checked_sub(lights.len()).map(|i| &lamps[i]);
+                let lamp = index.checked_sub(lamps_from).map(|i| &sources.lamps[i]);
                 add_polygons(frame, light, lamp, &mut record, &mut polygons);
+            }
+            if (suns_from..lamps_from).contains(&index) {
+                record.inner = OF_ENVIRONMENT;
             }
             first_layer += record.layer_count;
             first_photon += count;

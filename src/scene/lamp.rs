@@ -129,11 +129,6 @@ impl Lamp {
         groups.into_iter().map(Self::of).collect()
     }
 
-    /// `lights`, and behind them those that stand for lamps: what shadow maps are made for.
-    pub fn with_lights(lights: &[Light], lamps: &[Self]) -> Vec<Light> {
-        lights.iter().chain(lamps.iter().map(|l| &l.light)).cloned().collect()
-    }
-
     fn of(triangles: Vec<EmissiveTriangle>) -> Self {
         let area: f64 = triangles.iter().map(EmissiveTriangle::area).sum();
         let center = middle(&triangles);

@@ -9,11 +9,13 @@ mod environment;
 mod instance;
 mod lamp;
 mod light;
+mod light_sources;
 mod material;
 mod mesh;
 #[cfg(feature = "samples")]
 pub mod samples;
 mod summary;
+mod suns;
 mod unit_frame;
 
 pub use bounds::{BoundingSphere, SceneBounds};
@@ -23,9 +25,11 @@ pub use instance::Instance;
 pub use lamp::{EmissiveTriangle, Lamp};
 pub(crate) use light::one_minus_cos;
 pub use light::{Light, LightKind};
+pub use light_sources::LightSources;
 pub use material::{Material, Texture};
 pub use mesh::Mesh;
 pub use summary::SceneSummary;
+pub use suns::Sun;
 pub use unit_frame::UnitFrame;
 
 use crate::Error;

@@ -87,9 +87,9 @@ impl SceneSummary {
         Ok(())
     }
 
-    /// Whether anything shines that the image-space passes model: a light that is no environment, or a surface.
+    /// Whether anything shines.
     pub fn is_lit(&self) -> bool {
-        self.lights > self.environment_lights || !self.emissive_triangles.is_empty()
+        self.lights > 0 || !self.emissive_triangles.is_empty()
     }
 
     /// Reads it off a scene.

@@ -11,6 +11,8 @@
 @group(0) @binding(8) var<storage, read> polygons: array<Polygon>;
 @group(0) @binding(9) var shadow_maps: texture_2d_array<u32>;
 @group(0) @binding(10) var radiance: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(11) var<uniform> environment: Environment;
+@group(0) @binding(12) var environment_image: texture_2d<f32>;
 
 const SPECULAR_INVERSE_PI: f32 = 0.318309886;
 // A lamp that is set into a surface stands before it, though rounding may say otherwise.
@@ -43,6 +45,9 @@ fn advanced(before: SpecularPath, index: u32, pixel: vec2u) -> SpecularPath {
     let furthest = select(1e30, hit.distance, is_hit);
     let weight = select(params.indirect_weight, params.direct_weight, params.step == 0u);
     path.radiance += weight * path.throughput * lamps_crossed(ray, furthest);
+    if hit.kind == HIT_ESCAPED {
+        path.radiance += weight * path.throughput * environment_radiance(ray.direction);
+    }
     path.goes_on = 0u;
     rays[index] = specular_no_ray();
     if !is_hit {

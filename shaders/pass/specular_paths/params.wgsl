@@ -48,7 +48,7 @@ fn specular_punctual(scatterer: Scatterer, p: vec3f, outgoing: vec3f) -> vec3f {
         return sum;
     }
     for (var i = 0u; i < params.light_count; i++) {
-        if lights[i].kind == LIGHT_AREA {
+        if light_is_met(lights[i]) {
             continue;
         }
         var incoming = -lights[i].direction;

@@ -216,15 +216,8 @@ fn emitter_sample_triangle(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
     return EmitterSample(e.strength * texel, pdf, direction, false, bvh_offset(position, normal), true);
 }
 
-// Twin of `EnvironmentImage::uv_of`.
-fn environment_uv(direction: vec3f) -> vec2f {
-    let turn = (params.environment_rotation + atan2(direction.x, -direction.z)) / (2.0 * EMITTER_PI) + 0.5;
-    return vec2f(turn - floor(turn), atan2(length(direction.xz), direction.y) / EMITTER_PI);
-}
-
 fn environment_radiance(direction: vec3f) -> vec3f {
-    let texel = vec2u(environment_uv(direction) * vec2f(params.environment_size));
-    return textureLoad(environment, min(texel, params.environment_size - 1u), 0).rgb;
+    return textureLoad(environment, environment_texel(direction, params.environment_rotation, params.environment_size), 0).rgb;
 }
 
 // Twin of `reference::emitters::mean_of_channels`: what the environment is sampled in proportion to.

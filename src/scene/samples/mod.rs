@@ -2,19 +2,21 @@
 
 mod caustics;
 mod colonnade;
+mod courtyard;
 mod living_room;
 mod solids;
 
 pub use caustics::{dimpled_mirror, glass_sphere, ring_occluder, water};
 pub use colonnade::colonnade;
+pub use courtyard::courtyard;
 pub use living_room::living_room;
 
-use super::{Camera, Instance, Light, LightKind, Material, Mesh, Projection, Scene};
+use super::{Camera, EnvironmentImage, Instance, Light, LightKind, Material, Mesh, Projection, Scene};
 use glam::{DAffine3, DVec3, Vec3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Names accepted by [`by_name`], in the order of this list.
-pub const NAMES: [&str; 13] = [
+pub const NAMES: [&str; 14] = [
     "cornell",
     "cornell-spot",
     "plane",
@@ -28,6 +30,7 @@ pub const NAMES: [&str; 13] = [
     "ring-occluder",
     "dimpled-mirror",
     "water",
+    "courtyard",
 ];
 
 /// The sample of this name at `time`, or `None` if there is none.
@@ -46,6 +49,7 @@ pub fn by_name(name: &str, time: f64) -> Option<Scene> {
         "ring-occluder" => ring_occluder(time),
         "dimpled-mirror" => dimpled_mirror(time),
         "water" => water(time),
+        "courtyard" => courtyard(time),
         _ => return None,
     })
 }
@@ -501,6 +505,7 @@ mod tests {
             "ring-occluder",
             "dimpled-mirror",
             "water",
+            "courtyard",
         ];
         for name in moving {
             let (a, b) = (by_name(name, 0.0).unwrap(), by_name(name, 1.0).unwrap());
