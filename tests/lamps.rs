@@ -6,10 +6,12 @@ mod common;
 use common::{Component, Gpu, Offline, Reference, assert_no_errors, gpu};
 use lightfall::frame::{IndirectMethod, Settings, TracerKind};
 use lightfall::glam::{DVec3, Vec3};
+use lightfall::pass::FirstHits;
 use lightfall::read_buffer_blocking;
 use lightfall::reference::{PathComponent, PathTracerSettings};
 use lightfall::resource::{Photon, PhotonState};
 use lightfall::scene::{Instance, Light, LightKind, Material, Mesh, Scene, samples};
+use std::f64::consts::PI;
 
 const KINDS: [TracerKind; 3] = [TracerKind::ImageSpace, TracerKind::Hybrid, TracerKind::Bvh];
 const SIZE: [u32; 2] = [48, 48];
@@ -236,6 +238,117 @@ fn a_room_under_a_lamp_of_triangles_has_as_much_light_as_the_path_tracer_finds()
     let found = accumulated(&gpu, &unseen, &settings(TracerKind::Bvh), Component::Direct);
     println!("direct {found} against {direct}");
     assert!((found / direct - 1.0).abs().max_element() < 0.03, "{found}, {direct}");
+}
+
+#[test]
+fn photons_that_are_traced_from_their_light_start_all_over_its_extent() {
+    let Some(gpu) = gpu() else { return };
+    let at = DVec3::new(2.0, 3.6, 2.2);
+    let kinds = [
+        LightKind::Point {
+            position: at,
+            radius: 0.9,
+        },
+        LightKind::Spot {
+            position: at,
+            direction: DVec3::new(0.1, -1.0, 0.0),
+            inner_angle: 0.2,
+            outer_angle: 0.7,
+            radius: 0.9,
+        },
+    ];
+    let settings = |first_hits| Settings {
+        first_hits,
+        ..settings(TracerKind::Bvh)
+    };
+    // Over what the path tracer finds: from the middle of the light and from all of it.
+    let bias = |kind: LightKind| {
+        let mut scene = samples::cornell(0.0);
+        scene.lights = vec![Light {
+            kind,
+            ..Light::point(at, 10.0, [1.0, 0.8, 0.5])
+        }];
+        let paths = PathTracerSettings {
+            component: PathComponent::Indirect,
+            bounces: 2,
+            ..Default::default()
+        };
+        let mut reference = Reference::new(&gpu, scene.clone(), &paths, 0, SIZE).unwrap();
+        (0..256).for_each(|_| reference.render_sample(None).unwrap());
+        let truth = means(&reference.read().unwrap().mean);
+        [FirstHits::ShadowMaps, FirstHits::Traced]
+            .map(|first| accumulated(&gpu, &scene, &settings(first), Component::Indirect) / truth)
+    };
+    for kind in kinds {
+        // Kernels and what is lost at edges are the same without an extent.
+        let without = bias(match kind {
+            LightKind::Point { position, .. } => LightKind::Point { position, radius: 0.0 },
+            LightKind::Spot {
+                position,
+                direction,
+                inner_angle,
+                outer_angle,
+                ..
+            } => LightKind::Spot {
+                position,
+                direction,
+                inner_angle,
+                outer_angle,
+                radius: 0.0,
+            },
+            other => other,
+        })[1];
+        let [from_middle, from_all] = bias(kind).map(|b| b / without - 1.0);
+        println!(
+            "{kind:?}: from the middle {from_middle:+.4}, from all of it {from_all:+.4}; without extent {without:.4}"
+        );
+        assert!(from_all.abs().max_element() < 0.015, "{from_all}");
+        assert!(from_all.length() < from_middle.length(), "{from_middle}");
+    }
+}
+
+#[test]
+fn photons_of_a_wide_sun_that_sets_come_from_the_part_above_the_horizon() {
+    let Some(gpu) = gpu() else { return };
+    let angle = 0.5;
+    let settings = Settings {
+        first_hits: FirstHits::Traced,
+        bounces: 1,
+        photons: 200_000,
+        ..settings(TracerKind::Bvh)
+    };
+    for elevation in [0.7, 0.3, 0.0, -0.2] {
+        let mut scene = samples::plane();
+        scene.lights[0].kind = LightKind::Directional {
+            direction: -DVec3::new(f64::cos(elevation), f64::sin(elevation), 0.0),
+            angle,
+        };
+        let offline = frame(&gpu, &scene, &settings, Component::Indirect);
+        let unit = offline.renderer.frame().unwrap().flux_scale();
+        let up = Photon::pack_unit_vector(Vec3::Y);
+        let above = |p: &&Photon| p.state() == PhotonState::Stored && p.normal == up;
+        let found: f64 = first_hits(&offline, &gpu)
+            .iter()
+            .filter(above)
+            .map(|p| f64::from(p.flux[0]))
+            .sum();
+        // Of a disc's directions those above the horizon, by their cosines with the plane and with the disc's middle.
+        let (mut over, mut across) = (0.0, 0.0);
+        for i in 0..500 {
+            let theta = angle * (f64::from(i) + 0.5) / 500.0;
+            for k in 0..500 {
+                let phi = 2.0 * PI * (f64::from(k) + 0.5) / 500.0;
+                let height = theta.cos() * f64::sin(elevation) + theta.sin() * phi.sin() * f64::cos(elevation);
+                over += height.max(0.0) * theta.sin();
+                across += theta.cos() * theta.sin();
+            }
+        }
+        // 10 W/m² on 200 by 200 m.
+        let expected = 10.0 * 4e4 * over / across;
+        let off = found * unit / expected - 1.0;
+        println!("elevation {elevation}: {:+.2} %", 100.0 * off);
+        assert!(off.abs() < 0.01, "{elevation}: {found}, expected {expected}");
+    }
 }
 
 #[test]

@@ -94,6 +94,49 @@ fn a_sun_lights_a_plane_by_its_cosine() {
     direct_light_matches(&scene, 0.0005, |_| 0.5 / std::f64::consts::PI * 10.0 * cosine);
 }
 
+/// Irradiance of a plane by a disc in the sky over that across the disc: quadrature over what stands above the horizon.
+fn disc_over_horizon(elevation: f64, angle: f64) -> f64 {
+    let axis = DVec3::new(elevation.cos(), elevation.sin(), 0.0);
+    let (side, up) = (DVec3::Z, DVec3::Z.cross(axis));
+    let steps = 1000;
+    let mut sums = [0.0; 2];
+    for ring in 0..steps {
+        let theta = angle * (f64::from(ring) + 0.5) / f64::from(steps);
+        for step in 0..steps {
+            let phi = std::f64::consts::TAU * (f64::from(step) + 0.5) / f64::from(steps);
+            let toward = theta.cos() * axis + theta.sin() * (phi.cos() * side + phi.sin() * up);
+            sums[0] += toward.y.max(0.0) * theta.sin();
+            sums[1] += toward.dot(axis) * theta.sin();
+        }
+    }
+    sums[0] / sums[1]
+}
+
+#[test]
+fn a_wide_sun_that_sets_lights_a_plane_by_the_part_above_the_horizon() {
+    for (elevation, angle) in [
+        (0.7, 0.5),
+        (0.4, 0.5),
+        (0.0, 0.5),
+        (-0.3, 0.5),
+        (0.002, 0.0047),
+        (0.02, 0.03),
+        (0.02, 0.24),
+        (0.02, 0.25),
+        (0.1, 1.1),
+        (-0.6, 0.5),
+    ] {
+        let mut scene = samples::plane();
+        scene.lights[0].kind = LightKind::Directional {
+            direction: -DVec3::new(f64::cos(elevation), f64::sin(elevation), 0.0),
+            angle,
+        };
+        let expected = 0.5 / std::f64::consts::PI * 10.0 * disc_over_horizon(elevation, angle);
+        println!("elevation {elevation}, half angle {angle}: {expected:.4}");
+        direct_light_matches(&scene, 1e-3, |_| expected);
+    }
+}
+
 #[test]
 fn emission_is_seen_on_the_front_and_not_on_the_back() {
     let Some(gpu) = gpu() else { return };

@@ -54,6 +54,35 @@ fn light_is_met(light: Light) -> bool {
     return light.kind == LIGHT_AREA || (light.kind == LIGHT_DIRECTIONAL && light.inner == LIGHT_OF_ENVIRONMENT);
 }
 
+// Tangent of a sun's half angle up to which a series is more exact than the formula.
+const LIGHT_SMALL_DISC: f32 = 0.25;
+
+// Sine of a sun's half angle.
+fn light_disc_sine(light: Light) -> f32 {
+    return light.extent * inverseSqrt(1.0 + light.extent * light.extent);
+}
+
+// Irradiance of a surface by a sun, over that across the sun: the cosine of the angle between normal and the way to its middle
+// while all of its disc stands over the surface's horizon, else of the part that does (Snyder 1996, "Area Light Sources for
+// Real-Time Graphics"; the form of Lagarde and de Rousiers 2014).
+fn light_sun_cosine(light: Light, cosine: f32) -> f32 {
+    let disc_sine = light_disc_sine(light);
+    if cosine >= disc_sine || cosine <= -disc_sine {
+        return max(0.0, cosine);
+    }
+    let t = light.extent;
+    let sine = sqrt(1.0 - cosine * cosine);
+    let y = clamp(-cosine / (t * sine), -1.0, 1.0);
+    let s = sine * sqrt(1.0 - y * y);
+    let z = s * t;
+    var rest = atan(z) / (disc_sine * disc_sine) - s / t;
+    if t < LIGHT_SMALL_DISC {
+        // The same by the arc tangent's series, without the digits that cancel.
+        rest = z * (1.0 - (1.0 + t * t) * s * s * (1.0 / 3.0 - z * z / 5.0 + z * z * z * z / 7.0));
+    }
+    return max(0.0, (cosine * acos(y) + rest) / 3.14159265);
+}
+
 fn light_layer_uv(x: f32, y: f32) -> vec2f {
     return vec2f(0.5 + 0.5 * x, 0.5 - 0.5 * y);
 }

@@ -1,7 +1,7 @@
 // Irradiance that an unoccluded light gives a surface element. The module brings `polygons`.
 fn light_irradiance(light: Light, p: vec3f, n: vec3f) -> vec3f {
     if light.kind == LIGHT_DIRECTIONAL {
-        return light.intensity * max(0.0, -dot(n, light.direction));
+        return light.intensity * light_sun_cosine(light, -dot(n, light.direction));
     }
     if light.kind == LIGHT_AREA {
         var sum = vec3f(0.0);

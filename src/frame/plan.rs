@@ -1,7 +1,7 @@
 //! Model only what the scene requires: which stages run, and why.
 
 use super::{IndirectMethod, Settings, TracerKind};
-use crate::pass::PenumbraSearch;
+use crate::pass::{FirstHits, PenumbraSearch};
 use crate::resource::MAX_DIRECT_POLYGONS;
 use crate::scene::SceneSummary;
 use std::fmt;
@@ -328,8 +328,12 @@ fn simplifications(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
         (_, suns) => notes.push(format!("the environment gives the light of at most {suns} suns")),
     }
     if summary.lights_with_extent > 0 {
+        let photons = match settings.first_hits {
+            FirstHits::ShadowMaps => "photons start at the centre, ",
+            FirstHits::Traced => "",
+        };
         notes.push(format!(
-            "{} light(s) with an extent: photons start at the centre, irradiance is a point's",
+            "{} light(s) with an extent: {photons}irradiance of bulbs and spots is a point's",
             summary.lights_with_extent
         ));
     }

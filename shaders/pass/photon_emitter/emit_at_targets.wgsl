@@ -6,7 +6,7 @@ fn nothing_emitted() -> Photon {
     return photon_gone(PHOTON_EMPTY, vec3f(0.0), vec3f(0.0, 0.0, 1.0), 0u);
 }
 
-// From a flat light.
+// From a surface.
 fn start_at_targets(light: Light, light_index: u32, sequence_index: u32, count: u32) -> Photon {
     let place = surface_start(light, sequence_index, count);
     let aim = aim_from_point(place.position, random_pair(sequence_index, 0u));
@@ -58,9 +58,9 @@ fn emit_photons_at_targets(@builtin(global_invocation_id) id: vec3u) {
     }
     let light = lights[light_index];
     let sequence_index = params.sample_offset + index;
-    if light.kind == LIGHT_AREA {
+    if starts_on_surface(light) {
         photons[index] = start_at_targets(light, light_index, sequence_index, range.y);
     } else {
-        photons[index] = emit_at_targets(light, light_index, sequence_index, range.y);
+        photons[index] = emit_at_targets(light_within(light, sequence_index), light_index, sequence_index, range.y);
     }
 }

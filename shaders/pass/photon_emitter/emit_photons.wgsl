@@ -62,12 +62,13 @@ fn emit_photon(index: u32, start: EmissionStart, kept: u32) {
         photons[index] = photon_gone(PHOTON_EMPTY, vec3f(0.0), vec3f(0.0, 0.0, 1.0), 0u);
         return;
     }
-    if light.kind == LIGHT_AREA {
+    if starts_on_surface(light) {
         let place = surface_start(light, params.sample_offset + index, light.photon_count);
         let direction = normalize(sampling_frame(place.normal) * sampling_cosine(start.u));
         photons[index] = photon_started(place, light_index, direction, start.boost, kept);
         return;
     }
-    let emission = emit(light, start.u);
-    photons[index] = photon_on_ray(light_index, emission.ray, start.boost * emission.pdf, light.photon_flux / start.boost, kept);
+    let within = light_within(light, params.sample_offset + index);
+    let emission = emit(within, start.u);
+    photons[index] = photon_on_ray(light_index, emission.ray, start.boost * emission.pdf, within.photon_flux / start.boost, kept);
 }

@@ -1,5 +1,5 @@
-// Where emitted photons first land: in the light's reflective shadow map. Or they only set out, as those of flat lights do from
-// their surface, and the walk traces their first hop.
+// Where emitted photons first land: in the light's reflective shadow map. Or they only set out, from any point of a light with an
+// extent, as those of flat lights do from their surface, and the walk traces their first hop.
 
 struct Params {
     photon_count: u32,
@@ -17,7 +17,7 @@ struct Params {
 @group(0) @binding(3) var<storage, read_write> photons: array<Photon>;
 @group(0) @binding(4) var<storage, read> polygons: array<Polygon>;
 
-// A place on a flat light.
+// A place on a light's surface.
 struct SurfaceStart {
     position: vec3f,
     normal: vec3f,
@@ -46,9 +46,54 @@ fn polygon_of(light: Light, u: f32) -> u32 {
     return low;
 }
 
+// Whether photons start on a surface, flat or round, with a cosine's spread.
+fn starts_on_surface(light: Light) -> bool {
+    return light.kind == LIGHT_AREA || (params.traces_first == 1u && light.kind == LIGHT_POINT && light.extent > 0.0);
+}
+
+// One of the points that a spot's disc, or of the directions that a sun's, is made of; it sends out what all of them do. A shadow
+// map knows their middle alone.
+fn light_within(light: Light, sequence_index: u32) -> Light {
+    var own = light;
+    if params.traces_first == 0u || light.extent <= 0.0 {
+        return own;
+    }
+    let place = random_recurrence(sequence_index);
+    if light.kind == LIGHT_SPOT {
+        let at = light.extent * sampling_disc(place);
+        own.position += at.x * light.right + at.y * light.up;
+    }
+    if light.kind == LIGHT_DIRECTIONAL {
+        // 1 - cos of the half angle.
+        let cosine = inverseSqrt(1.0 + light.extent * light.extent);
+        let until = light.extent * cosine * light.extent * cosine / (1.0 + cosine);
+        let v = place.x * until;
+        let phi = 2.0 * SAMPLING_PI * place.y;
+        let r = sqrt(v * (2.0 - v));
+        let local = vec3f(r * cos(phi), r * sin(phi), 1.0 - v);
+        let axes = sampling_frame(normalize(mat3x3f(light.right, light.up, light.direction) * local));
+        own.right = axes[0];
+        own.up = axes[1];
+        own.direction = axes[2];
+        // Light of irradiance E across the middle: of radiance E / (pi sin^2), from 2 pi (1 - cos) of directions.
+        own.photon_flux *= 2.0 / (1.0 + cosine);
+    }
+    return own;
+}
+
+// On the sphere of a point light.
+fn sphere_start(light: Light, sequence_index: u32, photon_count: u32) -> SurfaceStart {
+    let normal = sampling_sphere(random_recurrence(sequence_index));
+    let all = light.photon_flux * f32(max(light.photon_count, 1u));
+    return SurfaceStart(light.position + light.extent * normal, normal, all / f32(photon_count));
+}
+
 // On the surface of a flat light, in proportion to the flux of its polygons: two of the four numbers that such a photon is
 // made of, from an additive recurrence.
 fn surface_start(light: Light, sequence_index: u32, photon_count: u32) -> SurfaceStart {
+    if light.kind != LIGHT_AREA {
+        return sphere_start(light, sequence_index, photon_count);
+    }
     let place = random_recurrence(sequence_index);
     let index = polygon_of(light, place.x);
     let polygon = polygons[index];

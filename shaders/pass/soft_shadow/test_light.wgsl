@@ -35,8 +35,9 @@ fn test_pixels(@builtin(global_invocation_id) id: vec3u) {
     let light = lights[params.light];
     let receiver = receiver_at(light, id.xy);
     let is_seen = textureLoad(base_color_texture, id.xy + view.origin, 0).a > 0.0;
-    // Of a flat lamp a part may stand above the horizon where its middle does not.
-    let is_turned_away = light.kind != LIGHT_AREA && dot(receiver.normal, receiver.to_light) <= 0.0;
+    // Of a flat lamp, or a wide sun, a part may stand above the horizon where its middle does not.
+    let lowest = select(0.0, -light_disc_sine(light), light.kind == LIGHT_DIRECTIONAL);
+    let is_turned_away = light.kind != LIGHT_AREA && dot(receiver.normal, receiver.to_light) <= lowest;
     if !is_seen || is_turned_away {
         // The blur takes the mark out again; for a light without extent this is the end.
         let mark = select(NO_RECEIVER, 0.0, light.extent <= 0.0);
