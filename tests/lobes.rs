@@ -272,6 +272,125 @@ fn rough_lobes_are_drawn_as_their_densities_say_and_scatter_what_a_quadrature_fi
     }
 }
 
+/// Exponents of Phong lobes.
+const EXPONENTS: [f64; 5] = [1.0, 10.0, 100.0, 1000.0, 20_000.0];
+
+#[test]
+fn phong_lobes_are_drawn_as_their_densities_say_and_scatter_what_a_quadrature_finds() {
+    let Some(gpu) = gpu() else { return };
+    let inputs: Vec<[u32; 4]> = (0..CASES as u32)
+        .flat_map(|case| (0..SAMPLES).map(move |i| [case, i, 13, 0]))
+        .collect();
+    let scatterer = |case: &str| {
+        let list = |values: [f64; 5]| values.map(|v| format!("{v:.9}")).join(", ");
+        format!(
+            "var exponents = array<f32, 5>({}); var angles = array<f32, 5>({});
+            let a = angles[{case} % 5u]; let o = vec3f(sin(a), 0.0, cos(a));
+            let s = scatter_by(vec3f(0.0, 0.0, 1.0), true, vec3f(1.0), 1.0, -exponents[{case} / 5u], 0.0, {INDEX});",
+            list(EXPONENTS),
+            list(DEGREES.map(f64::to_radians)),
+        )
+    };
+    let body = format!(
+        "{}
+        let random = vec4f(hash_pcg4d(input) >> vec4u(8u)) * 0x1p-24;
+        let drawn = scatter_sample(s, o, random);
+        return vec4f(drawn.direction, drawn.weight.x);",
+        scatterer("input.x")
+    );
+    let drawn = run(&gpu, &body, &inputs);
+    // The lobe about the mirrored direction, in u = cosⁿ⁺¹ and φ, in which it is uniform.
+    let steps = BINS * POINTS;
+    let points: Vec<Vec<(usize, DVec3, f64)>> = (0..CASES)
+        .map(|case| {
+            let (o, n) = (eye(case), EXPONENTS[case / 5]);
+            let mirrored = DVec3::new(-o.x, -o.y, o.z);
+            let (across, up) = (DVec3::Y, mirrored.cross(DVec3::Y));
+            let point = |k: usize| {
+                let (i, j) = (k / steps, k % steps);
+                let cosine = ((i as f64 + 0.5) / steps as f64).powf(1.0 / (n + 1.0));
+                let (sin, cos) = (TAU * (j as f64 + 0.5) / steps as f64).sin_cos();
+                let direction = cosine * mirrored + (1.0 - cosine * cosine).sqrt() * (cos * across + sin * up);
+                (i / POINTS * BINS + j / POINTS, direction, cosine)
+            };
+            (0..steps * steps).map(point).collect()
+        })
+        .collect();
+    let directions: Vec<[f32; 4]> = (0..CASES)
+        .flat_map(|case| {
+            points[case]
+                .iter()
+                .step_by(7)
+                .map(move |p| p.1.as_vec3().extend(case as f32).to_array())
+        })
+        .collect();
+    let body = format!(
+        "{} return scatter_evaluate(s, o, normalize(input.xyz));",
+        scatterer("u32(input.w)")
+    );
+    let mut evaluated = run(&gpu, &body, &directions).into_iter();
+    let mut worst = [0f64; 3];
+    for case in 0..CASES {
+        let (o, n) = (eye(case), EXPONENTS[case / 5]);
+        let mirrored = DVec3::new(-o.x, -o.y, o.z);
+        let up = mirrored.cross(DVec3::Y);
+        let each = f64::from(SAMPLES) / (steps * steps) as f64;
+        let mut expected = vec![0.0; BINS * BINS + 1];
+        let mut albedo = 0.0;
+        for &(bin, direction, _) in &points[case] {
+            let is_free = direction.z > 0.0;
+            expected[if is_free { bin } else { BINS * BINS }] += each;
+            albedo += (n + 2.0) / (n + 1.0) * direction.z.max(0.0) / (steps * steps) as f64;
+        }
+        let (mut counts, mut scattered) = (vec![0.0; expected.len()], 0.0);
+        for &[x, y, z, weight] in &drawn[case * SAMPLES as usize..][..SAMPLES as usize] {
+            let direction = DVec3::new(x.into(), y.into(), z.into());
+            // 1 - cos, which keeps its digits.
+            let off = 0.5 * (direction - mirrored).length_squared();
+            let u = ((n + 1.0) * (-off).ln_1p()).exp();
+            let phi = direction.dot(up).atan2(direction.dot(DVec3::Y)).rem_euclid(TAU) / TAU;
+            let place = |u: f64| ((u * BINS as f64) as usize).min(BINS - 1);
+            let bin = if weight > 0.0 {
+                place(u) * BINS + place(phi)
+            } else {
+                BINS * BINS
+            };
+            counts[bin] += 1.0;
+            scattered += f64::from(weight) / f64::from(SAMPLES);
+        }
+        // Over the directions that are not blocked, 2π/(n + 1) of u and φ at u^(n/(n + 1)).
+        let (mut integral, mut wanted) = (0.0, 0.0);
+        for (&(_, direction, cosine), found) in points[case].iter().step_by(7).zip(&mut evaluated) {
+            if direction.z > 0.0 {
+                integral += f64::from(found[3]) * TAU / (n + 1.0) / cosine.powf(n);
+                wanted += 1.0;
+            }
+        }
+        let figures = [
+            chi_square(&counts, &expected),
+            (scattered / albedo - 1.0).abs(),
+            (integral / wanted - 1.0).abs(),
+        ];
+        for (worst, figure) in worst.iter_mut().zip(figures) {
+            *worst = worst.max(figure);
+        }
+        let name = format!("exponent {n}, {}°", DEGREES[case % 5]);
+        assert!(figures[0] < 4.0, "{name}: χ² is {:.1} deviations too large", figures[0]);
+        assert!(figures[1] < 5e-3, "{name}: scatters {scattered}, expected {albedo}");
+        assert!(
+            figures[2] < 1e-3,
+            "{name}: the density integrates to {integral}, expected {wanted}"
+        );
+        assert!(o.z > 0.0 && albedo < 1.0 + 1e-3, "{name}: {albedo}");
+    }
+    println!(
+        "Phong, 5 × 5: χ² at most {:.2} deviations, albedo off by {:.3} %, density by {:.4} %",
+        worst[0],
+        100.0 * worst[1],
+        100.0 * worst[2]
+    );
+}
+
 #[test]
 fn diffuse_and_smooth_surfaces_scatter_all_light_in_a_white_furnace() {
     let Some(gpu) = gpu() else { return };

@@ -1,16 +1,22 @@
 // How a surface scatters light, in 14 bits beside its colour: what surface texels, G-buffers and photons keep of a material.
-//   bits 0-1  LOBE_DIFFUSE, LOBE_METAL or LOBE_GLASS
+//   bits 0-1  LOBE_DIFFUSE, LOBE_METAL, LOBE_GLASS or LOBE_PHONG
 //   metal     bits 2-13 perceptual roughness, in 4095ths
+//   Phong     bits 2-13 log2(exponent + 1), in 256ths; its roughness is minus the exponent
 //   glass     bits 2-6 perceptual roughness, in 31sts; bits 7-13 index of refraction - 1, in 64ths
 // A diffuse surface is 0.
 
 const LOBE_DIFFUSE: u32 = 0u;
 const LOBE_METAL: u32 = 1u;
 const LOBE_GLASS: u32 = 2u;
+const LOBE_PHONG: u32 = 3u;
 const LOBE_KIND: u32 = 3u;
 const LOBE_BITS: u32 = 0x3fffu;
 
+// Of GGX, or of a Phong lobe where roughness is negative.
 fn lobe_metal(roughness: f32) -> u32 {
+    if roughness < 0.0 {
+        return LOBE_PHONG | (u32(round(min(256.0 * log2(1.0 - roughness), 4095.0))) << 2u);
+    }
     return LOBE_METAL | (u32(round(saturate(roughness) * 4095.0)) << 2u);
 }
 
@@ -20,7 +26,7 @@ fn lobe_glass(roughness: f32, index_of_refraction: f32) -> u32 {
     return LOBE_GLASS | (u32(round(saturate(roughness) * 31.0)) << 2u) | (index << 7u);
 }
 
-// Of a material by the conventions of glTF 2.0.
+// Of a material by the conventions of glTF 2.0; negative roughness as of `lobe_metal`.
 fn lobe_of(metallic: f32, roughness: f32, transmission: f32, index_of_refraction: f32) -> u32 {
     if transmission > 0.5 {
         return lobe_glass(roughness, index_of_refraction);
@@ -39,6 +45,9 @@ fn lobe_is_specular(lobe: u32) -> bool {
 fn lobe_roughness(lobe: u32) -> f32 {
     if lobe_kind(lobe) == LOBE_METAL {
         return f32((lobe >> 2u) & 4095u) / 4095.0;
+    }
+    if lobe_kind(lobe) == LOBE_PHONG {
+        return 1.0 - exp2(f32((lobe >> 2u) & 4095u) / 256.0);
     }
     return f32((lobe >> 2u) & 31u) / 31.0;
 }

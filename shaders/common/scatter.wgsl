@@ -1,12 +1,14 @@
 // How surfaces scatter: sampling a direction, and evaluating one with its density. Directions point away from the
 // surface; `outgoing` is the one towards the eye. Rough lobes are GGX with Smith shadowing of both directions apart
-// (Walter et al. 2007), their normals sampled as they are seen (Heitz 2018).
+// (Walter et al. 2007), their normals sampled as they are seen (Heitz 2018); or Phong, normalised so that none creates light
+// (Lafortune and Willems 1994).
 
 const SCATTER_DIFFUSE: u32 = 0u;
 const SCATTER_MIRROR: u32 = 1u;
 const SCATTER_METAL: u32 = 2u;
 const SCATTER_GLASS: u32 = 3u;
 const SCATTER_ROUGH_GLASS: u32 = 4u;
+const SCATTER_PHONG: u32 = 5u;
 
 // Twins of the conventions of `scene::Material`.
 const SCATTER_IS_METAL: f32 = 0.5;
@@ -26,6 +28,7 @@ struct Scatterer {
     frame: mat3x3f,
     // Reflectance, or the tint of what passes through
     color: vec3f,
+    // Of GGX; the exponent of a Phong lobe
     alpha: f32,
     // Index of refraction of the far side over that of the near side
     eta: f32,
@@ -41,27 +44,28 @@ struct Scattering {
     squeeze: f32,
 }
 
-// Of a material by the conventions of glTF 2.0. `normal` is on the side that the ray came from.
+// Of a material by the conventions of glTF 2.0; a metal of negative roughness is a Phong lobe of that exponent. `normal` is on the side that the ray came from.
 fn scatter_by(
     normal: vec3f, is_front: bool, color: vec3f, metallic: f32, roughness: f32, transmission: f32, index: f32,
 ) -> Scatterer {
-    let is_smooth = roughness < SCATTER_SMOOTH;
+    let is_phong = roughness < 0.0;
+    let is_smooth = roughness < SCATTER_SMOOTH && !is_phong;
     var kind = SCATTER_DIFFUSE;
     if transmission > SCATTER_IS_TRANSMISSIVE {
         // Facets that do not bend light leave it a single direction.
         let is_single = is_smooth || index - 1.0 < SCATTER_LEAST_BENDING;
         kind = select(SCATTER_ROUGH_GLASS, SCATTER_GLASS, is_single);
     } else if metallic > SCATTER_IS_METAL {
-        kind = select(SCATTER_METAL, SCATTER_MIRROR, is_smooth);
+        kind = select(select(SCATTER_METAL, SCATTER_MIRROR, is_smooth), SCATTER_PHONG, is_phong);
     }
-    let alpha = max(roughness * roughness, SCATTER_LEAST_ALPHA);
+    let alpha = select(max(roughness * roughness, SCATTER_LEAST_ALPHA), -roughness, is_phong);
     return Scatterer(kind, sampling_frame(normal), color, alpha, select(1.0 / index, index, is_front));
 }
 
 // As a lobe says.
 fn scatter_by_lobe(lobe: u32, normal: vec3f, is_front: bool, color: vec3f) -> Scatterer {
     let kind = lobe_kind(lobe);
-    let metallic = select(0.0, 1.0, kind == LOBE_METAL);
+    let metallic = select(0.0, 1.0, kind == LOBE_METAL || kind == LOBE_PHONG);
     let transmission = select(0.0, 1.0, kind == LOBE_GLASS);
     let index = select(1.0, lobe_index_of_refraction(lobe), kind == LOBE_GLASS);
     return scatter_by(normal, is_front, color, metallic, lobe_roughness(lobe), transmission, index);
@@ -78,6 +82,7 @@ fn scatter_sample(s: Scatterer, outgoing: vec3f, random: vec4f) -> Scattering {
     switch s.kind {
         case SCATTER_MIRROR: { local = Scattering(vec3f(-o.xy, o.z), s.color, 0.0, 1.0); }
         case SCATTER_METAL: { local = scatter_sample_metal(s, o, random); }
+        case SCATTER_PHONG: { local = scatter_sample_phong(s, o, random); }
         case SCATTER_GLASS: { local = scatter_sample_glass(s, o, vec3f(0.0, 0.0, 1.0), random.z); }
         case SCATTER_ROUGH_GLASS: { local = scatter_sample_rough_glass(s, o, random); }
         default: {
@@ -106,6 +111,13 @@ fn scatter_evaluate(s: Scatterer, outgoing: vec3f, incoming: vec3f) -> vec4f {
             let seen = ggx_seen_density(o, h, s.alpha) / (4.0 * dot(o, h));
             return vec4f(s.color * seen * ggx_lit_share(i, s.alpha), seen);
         }
+        case SCATTER_PHONG: {
+            if i.z <= 0.0 || o.z <= 0.0 {
+                return vec4f(0.0);
+            }
+            let share = pow(max(0.0, dot(i, vec3f(-o.xy, o.z))), s.alpha) / (2.0 * SCATTER_PI);
+            return vec4f(s.color * (share * (s.alpha + 2.0) * i.z), share * (s.alpha + 1.0));
+        }
         case SCATTER_ROUGH_GLASS: { return scatter_evaluate_rough_glass(s, o, i); }
         default: { return vec4f(0.0); }
     }
@@ -120,6 +132,22 @@ fn scatter_sample_metal(s: Scatterer, o: vec3f, random: vec4f) -> Scattering {
     }
     let pdf = ggx_seen_density(o, h, s.alpha) / (4.0 * max(dot(o, h), 1e-20));
     return Scattering(i, s.color * ggx_lit_share(i, s.alpha), pdf, 1.0);
+}
+
+// As dense as a power of the cosine with the mirrored direction.
+fn scatter_sample_phong(s: Scatterer, o: vec3f, random: vec4f) -> Scattering {
+    let logarithm = log(max(random.x, 0x1p-32)) / (s.alpha + 1.0);
+    let cosine = exp(logarithm);
+    // 1 - cos^2, by its series where digits would cancel.
+    let sine_squared = select(1.0 - cosine * cosine, -2.0 * logarithm * (1.0 + logarithm), logarithm > -0x1p-10);
+    let phi = 2.0 * SCATTER_PI * random.y;
+    let around = sqrt(sine_squared) * vec2f(cos(phi), sin(phi));
+    let i = sampling_frame(vec3f(-o.xy, o.z)) * vec3f(around, cosine);
+    if i.z <= 0.0 || o.z <= 0.0 {
+        return Scattering(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 1.0, 1.0);
+    }
+    let pdf = (s.alpha + 1.0) / (2.0 * SCATTER_PI) * pow(cosine, s.alpha);
+    return Scattering(i, s.color * ((s.alpha + 2.0) / (s.alpha + 1.0) * i.z), pdf, 1.0);
 }
 
 // Reflects or refracts about a normal by chance. Radiance that enters a denser medium is squeezed into a narrower cone,

@@ -408,7 +408,7 @@ impl BvhGeometry {
             emission: frame.radiance(Vec3::from(material.emission).as_dvec3()).to_array(),
             index_of_refraction: material.index_of_refraction,
             metallic: material.metallic,
-            roughness: material.roughness,
+            roughness: material.lobe_roughness(),
             transmission: material.transmission,
             base_color_texture: self.textures.layer(material.base_color_texture),
             metallic_roughness_texture: self.textures.layer(material.metallic_roughness_texture),

@@ -357,7 +357,7 @@ fn material_record(context: &PrepareContext<'_>, material: &Material) -> gpu::Me
         alpha_cutoff: material.alpha_cutoff.unwrap_or(0.0),
         emission: context.frame.radiance(emission).to_array(),
         metallic: material.metallic,
-        roughness: material.roughness,
+        roughness: material.lobe_roughness(),
         transmission: material.transmission,
         index_of_refraction: material.index_of_refraction,
         _pad: 0,

@@ -20,6 +20,8 @@ pub struct Material {
     pub metallic: f32,
     /// Perceptual roughness in [0, 1]; GGX α = roughness².
     pub roughness: f32,
+    /// Of a metal: a Phong lobe of this exponent, 1 to 60 000, instead of GGX. glTF has none; for the scenes of papers.
+    pub phong_exponent: Option<f32>,
     /// Multiplies `roughness` (green) and `metallic` (blue). Index into the scene's textures.
     pub metallic_roughness_texture: Option<usize>,
     /// Emitted radiance, W/m²/sr, linear RGB, front side.
@@ -42,6 +44,7 @@ impl Default for Material {
             base_color_texture: None,
             metallic: 0.0,
             roughness: 1.0,
+            phong_exponent: None,
             metallic_roughness_texture: None,
             emission: [0.0; 3],
             emission_texture: None,
@@ -77,6 +80,11 @@ impl Material {
         self.metallic > 0.5 && !self.is_transmissive()
     }
 
+    /// Roughness as shaders take it: that of GGX, or minus the exponent of a Phong lobe.
+    pub(crate) fn lobe_roughness(&self) -> f32 {
+        self.phong_exponent.map_or(self.roughness, |exponent| -exponent)
+    }
+
     /// Checks every factor and texture index.
     ///
     /// # Errors
@@ -103,6 +111,9 @@ impl Material {
             if !(0.0..=1.0).contains(&value) {
                 return error(field, format!("is {value}; expected between 0 and 1"));
             }
+        }
+        if let Some(exponent) = self.phong_exponent.filter(|e| !(1.0..=60_000.0).contains(e)) {
+            return error("phong_exponent", format!("is {exponent}; expected between 1 and 60000"));
         }
         if !self.emission.iter().all(|e| e.is_finite() && *e >= 0.0) {
             return error(
