@@ -5,9 +5,9 @@ use crate::gpu::Slot;
 use crate::pass::photon_splatter::{raster, tiled};
 use crate::pass::{
     accumulator, composite, depth_hierarchy_build, direct_light, emission_importance, env_map_lighting,
-    env_map_selector, final_gather, image_space_tracer, irradiance_filter, nearest_occluder, photon_emitter,
-    photon_grid, photon_splatter, photon_walk, soft_shadow, specular_paths, stable_sort, tone_map, trace_statistics,
-    upsampler,
+    env_map_selector, final_gather, glossy_light, image_space_tracer, irradiance_filter, nearest_occluder,
+    photon_emitter, photon_grid, photon_splatter, photon_walk, soft_shadow, specular_paths, stable_sort, tone_map,
+    trace_statistics, upsampler,
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
@@ -298,7 +298,10 @@ fn twins() -> Vec<Twin> {
         }),
         twin!(wgsl::SPECULAR_PATHS_BEGIN, "Params", specular_paths::gpu::Params {
             width, first_row, row_count, step, steps, round, rounds, sample_offset, light_count, shadow_map_size,
-            direct_weight, indirect_weight,
+            direct_weight, indirect_weight, skips_glossy,
+        }),
+        twin!(wgsl::GLOSSY_LIGHT, "Params", glossy_light::gpu::Params {
+            light_count, shadow_map_size, direct_weight, indirect_weight,
         }),
         twin!(wgsl::SPECULAR_PATHS_BEGIN, "SpecularPath", specular_paths::gpu::SpecularPath {
             throughput, goes_on, radiance, _pad,
@@ -477,6 +480,7 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "PhotonGrid" => vec![&photon_grid::SLOTS],
         "SpecularPaths begin" => vec![&specular_paths::BEGIN_SLOTS],
         "SpecularPaths" => vec![&specular_paths::ADVANCE_SLOTS],
+        "GlossyLight" => vec![&glossy_light::SLOTS],
         "EnvMapLighting" => vec![&env_map_lighting::SLOTS],
         "FinalGather spread" => vec![&final_gather::SPREAD_SLOTS],
         "FinalGather sum" => vec![&final_gather::SUM_SLOTS],

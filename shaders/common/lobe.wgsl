@@ -42,6 +42,15 @@ fn lobe_is_specular(lobe: u32) -> bool {
     return (lobe & LOBE_KIND) != LOBE_DIFFUSE;
 }
 
+// Twin of the conventions of `scene::Material`: below it a surface is smooth.
+const LOBE_SMOOTH: f32 = 0.03;
+
+// Whether it reflects all light, and into more directions than one.
+fn lobe_is_glossy(lobe: u32) -> bool {
+    let kind = lobe_kind(lobe);
+    return kind == LOBE_PHONG || (kind == LOBE_METAL && lobe_roughness(lobe) >= LOBE_SMOOTH);
+}
+
 fn lobe_roughness(lobe: u32) -> f32 {
     if lobe_kind(lobe) == LOBE_METAL {
         return f32((lobe >> 2u) & 4095u) / 4095.0;

@@ -13,7 +13,6 @@ const SCATTER_PHONG: u32 = 5u;
 // Twins of the conventions of `scene::Material`.
 const SCATTER_IS_METAL: f32 = 0.5;
 const SCATTER_IS_TRANSMISSIVE: f32 = 0.5;
-const SCATTER_SMOOTH: f32 = 0.03;
 // Narrower lobes are as narrow as this.
 const SCATTER_LEAST_ALPHA: f32 = 0.001;
 // Glass of an index nearer to 1 than this is taken as smooth: from directions that differ by rounding alone no facet can be
@@ -49,7 +48,7 @@ fn scatter_by(
     normal: vec3f, is_front: bool, color: vec3f, metallic: f32, roughness: f32, transmission: f32, index: f32,
 ) -> Scatterer {
     let is_phong = roughness < 0.0;
-    let is_smooth = roughness < SCATTER_SMOOTH && !is_phong;
+    let is_smooth = roughness < LOBE_SMOOTH && !is_phong;
     var kind = SCATTER_DIFFUSE;
     if transmission > SCATTER_IS_TRANSMISSIVE {
         // Facets that do not bend light leave it a single direction.

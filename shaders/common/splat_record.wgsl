@@ -3,6 +3,9 @@
 // Bits of a splat's radius that number its surface, where photons keep to surfaces.
 const SPLAT_SURFACE_BITS: u32 = 0xffffu;
 
+// The sign of its radius: it came straight from a flat light, where light on rough metals is sorted.
+const SPLAT_STRAIGHT: u32 = 0x80000000u;
+
 struct Splat {
     position: vec3f,
     // Bits of one over the squared radius; where photons keep to surfaces, the last sixteen are the surface's number

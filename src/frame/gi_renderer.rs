@@ -447,7 +447,8 @@ impl GiRenderer {
             self.indirect = Some(IndirectScene::new(device, queue, settings)?);
         }
         if let Some(indirect) = &mut self.indirect {
-            indirect.sort_photons(device, plan.is_on(Stage::PhotonGrid))?;
+            let sorted = [Stage::PhotonGrid, Stage::GlossyLight].map(|stage| plan.is_on(stage));
+            indirect.sort_photons(device, sorted)?;
             indirect.split_caustics(device, settings, plan.is_on(Stage::CausticMap))?;
         }
         Ok(())

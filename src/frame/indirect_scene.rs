@@ -1,7 +1,7 @@
 //! What all views share of indirect light: photons, and what the settings let them meet.
 
 use super::traced_photons::{TracedPhotons, WalkInputs};
-use super::{IndirectMethod, SceneInputs, Settings, TracerKind};
+use super::{GlossyMethod, IndirectMethod, SceneInputs, Settings, TracerKind};
 use crate::Error;
 #[cfg(feature = "bvh")]
 use crate::pass::BvhTracer;
@@ -9,7 +9,7 @@ use crate::pass::{
     Bandwidth, DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EmissionImportance,
     EmissionImportanceResources, EmissionUpdateInputs, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources,
     EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources, EnvMapLightingSettings, FirstHits, ImageSpaceTracer,
-    PhotonEmitter, PhotonGrid, PhotonGridInputs, PhotonGridResources, PhotonSpread,
+    PhotonEmitter, PhotonGrid, PhotonGridInputs, PhotonGridResources, PhotonSpread, SortedPhotons,
 };
 use crate::resource::{
     CaptureView, DepthHierarchy, EmissionCells, EnvMapIrradiance, EnvMaps, Lights, PhotonMap, PhotonTargets, Photons,
@@ -33,6 +33,8 @@ pub(super) struct PhotonPasses {
     /// If light is gathered from there.
     env_map_lighting: Option<EnvMapLighting>,
     photon_grid: PhotonGrid,
+    /// If the settings light rough metal by photons.
+    glossy_grid: Option<PhotonGrid>,
 }
 
 /// Allocated while there is indirect light.
@@ -46,6 +48,8 @@ pub(super) struct IndirectScene {
     caustics: Option<(TracedPhotons, PhotonTargets)>,
     /// While anything specular may be seen.
     grid: Option<PhotonGridResources>,
+    /// While rough metal is lit by photons.
+    glossy_grid: Option<PhotonGridResources>,
 }
 
 /// Allocated while rays are traced, or light is gathered, in image space.
@@ -81,6 +85,7 @@ pub(super) struct PhotonInputs<'a> {
 impl PhotonPasses {
     pub(super) fn new(device: &wgpu::Device, settings: &Settings) -> Self {
         let (kind, method) = (settings.tracer_kind, settings.trace_method);
+        let grid = |sorted| PhotonGrid::new(device, sorted, settings.splatter_config.keeps_to_surfaces);
         Self {
             env_map_capture: EnvMapCapture::new(),
             depth_hierarchy_build: settings.needs_hierarchy().then(|| DepthHierarchyBuild::new(device)),
@@ -93,7 +98,8 @@ impl PhotonPasses {
                 let config = &settings.splatter_config;
                 EnvMapLighting::new(device, config.kernel, config.keeps_to_surfaces)
             }),
-            photon_grid: PhotonGrid::new(device, settings.splatter_config.keeps_to_surfaces),
+            photon_grid: grid(SortedPhotons::OnDiffuse),
+            glossy_grid: (settings.glossy_method == GlossyMethod::Photons).then(|| grid(SortedPhotons::OnGlossy)),
         }
     }
 }
@@ -141,6 +147,7 @@ impl IndirectScene {
             image_space: settings.needs_env_maps().then(image_space).transpose()?,
             caustics: None,
             grid: None,
+            glossy_grid: None,
             global,
         })
     }
@@ -186,12 +193,17 @@ impl IndirectScene {
         }
     }
 
-    /// Keeps photons sorted, or not.
-    pub(super) fn sort_photons(&mut self, device: &wgpu::Device, is_wanted: bool) -> Result<(), Error> {
-        if !is_wanted {
-            self.grid = None;
-        } else if self.grid.is_none() {
-            self.grid = Some(PhotonGridResources::new(device, &self.global.photons)?);
+    /// Keeps photons sorted, or not: those on diffuse surfaces, and those on rough metal.
+    pub(super) fn sort_photons(&mut self, device: &wgpu::Device, [diffuse, glossy]: [bool; 2]) -> Result<(), Error> {
+        for (grid, is_wanted, sorted) in [
+            (&mut self.grid, diffuse, SortedPhotons::OnDiffuse),
+            (&mut self.glossy_grid, glossy, SortedPhotons::OnGlossy),
+        ] {
+            if !is_wanted {
+                *grid = None;
+            } else if grid.is_none() {
+                *grid = Some(PhotonGridResources::new(device, &self.global.photons, sorted)?);
+            }
         }
         Ok(())
     }
@@ -207,6 +219,10 @@ impl IndirectScene {
 
     pub(super) fn photon_grid(&self) -> Option<&PhotonGridResources> {
         self.grid.as_ref()
+    }
+
+    pub(super) fn glossy_grid(&self) -> Option<&PhotonGridResources> {
+        self.glossy_grid.as_ref()
     }
 
     pub(super) fn env_maps(&self) -> Option<&EnvMaps> {
@@ -295,7 +311,13 @@ impl IndirectScene {
             caustics.record(encoder, passes, &walk_inputs)?;
         }
         self.record_lighting(encoder, passes, inputs);
-        if let Some(grid) = &mut self.grid {
+        for (pass, grid) in [
+            (Some(&passes.photon_grid), &mut self.grid),
+            (passes.glossy_grid.as_ref(), &mut self.glossy_grid),
+        ] {
+            let (Some(pass), Some(grid)) = (pass, grid) else {
+                continue;
+            };
             let grid_inputs = PhotonGridInputs {
                 queue: scene.queue,
                 photons: &self.global.photons,
@@ -304,7 +326,7 @@ impl IndirectScene {
                 bandwidth: inputs.settings.splatter.bandwidth,
                 timestamps: scene.timestamps,
             };
-            passes.photon_grid.record(encoder, grid, &grid_inputs);
+            pass.record(encoder, grid, &grid_inputs);
         }
         Ok(())
     }
@@ -367,6 +389,9 @@ impl IndirectScene {
         }
         if let Some(grid) = &self.grid {
             list.push(("photon_grid", grid.memory_use()));
+        }
+        if let Some(grid) = &self.glossy_grid {
+            list.push(("glossy_grid", grid.memory_use()));
         }
         if lost > 0 {
             list.push(("lost_rays", lost));

@@ -1,13 +1,13 @@
 //! What a view has of indirect light: the estimate at a part of its pixels, and the levels from there to all of them.
 
 use super::indirect_scene::{IndirectScene, PhotonPasses};
-use super::{IndirectMethod, Settings, Upsampling, ViewInputs};
+use super::{GlossyMethod, IndirectMethod, Settings, Upsampling, ViewInputs};
 use crate::Error;
 #[cfg(feature = "bvh")]
 use crate::pass::{BvhTracerResources, BvhTracerSurfaceRayInputs};
 use crate::pass::{
     EmissionImportanceInputs, EmissionImportanceResources, FinalGather, FinalGatherInputs, FinalGatherResources,
-    ImageSpaceTracerRayInputs, ImageSpaceTracerResources, IrradianceFilter, IrradianceFilterInputs,
+    GlossyLight, ImageSpaceTracerRayInputs, ImageSpaceTracerResources, IrradianceFilter, IrradianceFilterInputs,
     IrradianceFilterResources, IrradianceFilterSettings, MarkedSplatInputs, PhotonSplatter, PhotonSplatterInputs,
     PhotonSplatterResources, PhotonSplatterSettings, SpecularPaths, SplatShape, Upsampler, UpsamplerInputs,
     UpsamplerResources, progressive_scale,
@@ -25,6 +25,8 @@ pub(super) struct ViewPasses {
     final_gather: Option<(FinalGather, IrradianceFilter)>,
     upsampler: Upsampler,
     pub(super) specular_paths: SpecularPaths,
+    /// If the settings light rough metal by photons.
+    pub(super) glossy_light: Option<GlossyLight>,
 }
 
 /// Allocated while there is indirect light.
@@ -106,6 +108,8 @@ impl ViewPasses {
                 settings.splatter_config.kernel,
                 settings.splatter_config.keeps_to_surfaces,
             ),
+            glossy_light: (settings.glossy_method == GlossyMethod::Photons)
+                .then(|| GlossyLight::new(device, settings.splatter_config.kernel)),
         })
     }
 }

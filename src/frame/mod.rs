@@ -16,4 +16,6 @@ mod traced_photons;
 
 pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};
 pub use plan::{Plan, PlannedStage, Stage};
-pub use settings::{CausticSettings, FinalGatherSettings, IndirectMethod, Settings, TracerKind, Upsampling};
+pub use settings::{
+    CausticSettings, FinalGatherSettings, GlossyMethod, IndirectMethod, Settings, TracerKind, Upsampling,
+};

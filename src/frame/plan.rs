@@ -1,6 +1,6 @@
 //! Model only what the scene requires: which stages run, and why.
 
-use super::{IndirectMethod, Settings, TracerKind};
+use super::{GlossyMethod, IndirectMethod, Settings, TracerKind};
 use crate::pass::{FirstHits, PenumbraSearch};
 use crate::resource::MAX_DIRECT_POLYGONS;
 use crate::scene::SceneSummary;
@@ -49,6 +49,8 @@ pub enum Stage {
     PhotonGrid,
     /// What is seen in mirrors and through glass.
     SpecularPaths,
+    /// What rough metal sends to the eye, from photons.
+    GlossyLight,
     /// The sum.
     Composite,
 }
@@ -98,6 +100,12 @@ impl Plan {
             (true, false) => (true, format!("seen in or through {}", specular.join(", "))),
         };
         let caustics = caustics(&specular, summary, settings);
+        let glossy = match (specular.0, summary.metals.is_empty(), settings.glossy_method) {
+            (false, ..) => specular.clone(),
+            (true, true, _) => (false, "no metal".to_owned()),
+            (true, false, GlossyMethod::Paths) => (false, "settings follow paths from rough metal".to_owned()),
+            (true, false, GlossyMethod::Photons) => (true, format!("{}, where rough", summary.metals.join(", "))),
+        };
         let has_surfaces = suns(summary, settings) > 0 || !summary.emissive_triangles.is_empty();
         let has_extent = summary.lights_with_extent > 0 || has_surfaces;
         let soft = match has_extent {
@@ -140,6 +148,7 @@ impl Plan {
                 stage(Stage::Upsampler, upsampling),
                 stage(Stage::PhotonGrid, specular.clone()),
                 stage(Stage::SpecularPaths, specular),
+                stage(Stage::GlossyLight, glossy),
                 stage(Stage::Composite, always("every view")),
             ],
             simplifications: simplifications(summary, settings),

@@ -112,6 +112,16 @@ pub enum Upsampling {
     ByLevels,
 }
 
+/// How rough metal that the eye sees is lit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum GlossyMethod {
+    /// By paths from the eye, as mirrors are: noise of few paths, sharp where the lobe is.
+    #[default]
+    Paths,
+    /// From the photons that arrive there, each by the BRDF: no ray, and blur of their kernels. For lobes that are wide.
+    Photons,
+}
+
 /// Settings of all stages. Start from a preset and change fields, or [`Settings::set`] them by name.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
@@ -165,6 +175,8 @@ pub struct Settings {
     /// Paths from each pixel whose surface is specular, 1 to 64: noise of rough surfaces and of glass, which reflects or transmits
     /// by chance, falls as their root.
     pub specular_paths: u32,
+    /// How rough metal is lit that the eye sees.
+    pub glossy_method: GlossyMethod,
     /// How photons are drawn: gathered in f32, or blended.
     pub splatter_config: PhotonSplatterConfig,
     /// How wide: more photons under a kernel are smoother and blurrier. And what is done at edges.
@@ -247,6 +259,7 @@ impl Settings {
             caustic: CausticSettings::default(),
             specular_surfaces: 6,
             specular_paths: 4,
+            glossy_method: GlossyMethod::default(),
             splatter_config: PhotonSplatterConfig::default(),
             splatter: PhotonSplatterSettings::default(),
             radius_alpha: 2.0 / 3.0,
@@ -563,6 +576,13 @@ const KNOBS: &[Knob] = &[
         (0.0..=LARGEST_RADIUS).contains(&v)
     }),
     field!("specular.paths", "1 to 64", specular_paths, |v| (1..=64).contains(&v)),
+    choice!(
+        "specular.glossy",
+        "paths or photons",
+        glossy_method,
+        ["paths", GlossyMethod::Paths],
+        ["photons", GlossyMethod::Photons]
+    ),
     field!("specular.surfaces", "1 to 32", specular_surfaces, |v| (1..=32)
         .contains(&v)),
     field!("final_gather.rays", "1 to 4096", final_gather.rays, |v| (1..=4096)

@@ -2,7 +2,7 @@
 
 use super::indirect_view::{IndirectViewInputs, MOST_RAYS, RayTracers, ViewTracers};
 use crate::Error;
-use crate::pass::{PathShape, SpecularPathsInputs, SpecularPathsResources};
+use crate::pass::{GlossyLightInputs, GlossyLightResources, PathShape, SpecularPathsInputs, SpecularPathsResources};
 use crate::resource::{Environment, Irradiance, ShadowMaps, SurfaceRays};
 
 /// Allocated while anything specular may be in view.
@@ -14,6 +14,7 @@ pub(super) struct SpecularView {
     /// Of each band.
     own: Vec<SpecularPathsResources>,
     tracers: ViewTracers,
+    glossy: GlossyLightResources,
     radiance: Irradiance,
 }
 
@@ -27,6 +28,7 @@ impl SpecularView {
             band_rows,
             own: own.collect::<Result<_, _>>()?,
             tracers: ViewTracers::new(device)?,
+            glossy: GlossyLightResources::new(device)?,
             radiance: Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?,
         })
     }
@@ -48,6 +50,8 @@ impl SpecularView {
             return Ok(());
         };
         let pass = &inputs.passes.0.specular_paths;
+        let glossy = inputs.passes.0.glossy_light.as_ref().zip(inputs.scene.glossy_grid());
+        let weights = [inputs.view.composite.direct, inputs.view.composite.indirect];
         let mut path_inputs = SpecularPathsInputs {
             queue: inputs.view.queue,
             g_buffer: inputs.g_buffer,
@@ -58,7 +62,8 @@ impl SpecularView {
             shadow_maps,
             environment,
             radiance: &self.radiance,
-            weights: [inputs.view.composite.direct, inputs.view.composite.indirect],
+            weights,
+            skips_glossy: glossy.is_some(),
             sample_offset: inputs.sample_offset,
             timestamps: inputs.view.timestamps,
         };
@@ -77,11 +82,24 @@ impl SpecularView {
             }
             path_inputs.rows[0] += self.band_rows;
         }
+        if let Some((pass, photons)) = glossy {
+            let glossy_inputs = GlossyLightInputs {
+                queue: inputs.view.queue,
+                g_buffer: inputs.g_buffer,
+                photons,
+                lights: inputs.lights,
+                shadow_maps,
+                radiance: &self.radiance,
+                weights,
+                timestamps: inputs.view.timestamps,
+            };
+            pass.record(encoder, &mut self.glossy, &glossy_inputs);
+        }
         Ok(())
     }
 
     pub(super) fn memory_use(&self) -> u64 {
         let own: u64 = self.own.iter().map(SpecularPathsResources::memory_use).sum();
-        self.rays.memory_use() + own + self.tracers.memory_use() + self.radiance.memory_use()
+        self.rays.memory_use() + own + self.tracers.memory_use() + self.glossy.memory_use() + self.radiance.memory_use()
     }
 }

@@ -8,7 +8,7 @@
 //! Cost: photons sorted, then texels × photons of the 27 cells around, which are as wide as the widest kernel that evenly
 //! spread photons have. Limits: no kernel is wider than a cell; lamps count by their centres.
 
-use super::{Bandwidth, BoundaryCorrection, Kernel, PhotonGrid, PhotonGridInputs, PhotonGridResources};
+use super::{Bandwidth, BoundaryCorrection, Kernel, PhotonGrid, PhotonGridInputs, PhotonGridResources, SortedPhotons};
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::{EnvMapIrradiance, EnvMaps, Lights, Photons, ShadowMaps};
 use crate::{Error, Timestamps, wgsl};
@@ -113,7 +113,7 @@ impl EnvMapLighting {
         };
         Self {
             device: device.clone(),
-            grid: PhotonGrid::new(device, keeps_to_surfaces),
+            grid: PhotonGrid::new(device, SortedPhotons::OnDiffuse, keeps_to_surfaces),
             light: device::compute_pipeline(device, &spec),
             layout,
         }
@@ -184,7 +184,7 @@ impl EnvMapLightingResources {
     pub fn new(device: &wgpu::Device, photons: &Photons) -> Result<Self, Error> {
         Ok(Self {
             params: device::uniform_buffer::<gpu::Params>(device, "lightfall::EnvMapLighting::params")?,
-            grid: PhotonGridResources::new(device, photons)?,
+            grid: PhotonGridResources::new(device, photons, SortedPhotons::OnDiffuse)?,
             groups: BindGroupCache::default(),
         })
     }

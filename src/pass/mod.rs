@@ -18,6 +18,7 @@ pub(crate) mod env_map_selector;
 pub(crate) mod final_gather;
 mod full_screen;
 mod g_buffer_capture;
+pub(crate) mod glossy_light;
 pub(crate) mod image_space_tracer;
 pub(crate) mod irradiance_filter;
 pub(crate) mod nearest_occluder;
@@ -52,6 +53,7 @@ pub use env_map_selector::{
 };
 pub use final_gather::{FinalGather, FinalGatherInputs, FinalGatherResources};
 pub use g_buffer_capture::{GBufferCapture, GBufferCaptureInputs};
+pub use glossy_light::{GlossyLight, GlossyLightInputs, GlossyLightResources};
 pub use image_space_tracer::{
     ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerRayInputs, ImageSpaceTracerResources,
     ImageSpaceTracerSettings, TraceMethod,
@@ -62,7 +64,7 @@ pub use irradiance_filter::{
 };
 pub use nearest_occluder::{NearestOccluder, NearestOccluderInputs, NearestOccluderResources};
 pub use photon_emitter::{FirstHits, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources, PhotonSpread};
-pub use photon_grid::{PhotonGrid, PhotonGridInputs, PhotonGridResources};
+pub use photon_grid::{PhotonGrid, PhotonGridInputs, PhotonGridResources, SortedPhotons};
 pub(crate) use photon_splatter::LARGEST_RADIUS;
 pub use photon_splatter::{
     Bandwidth, BoundaryCorrection, Kernel, MarkedSplatInputs, PhotonSplatter, PhotonSplatterConfig,

@@ -2,8 +2,8 @@
 //!
 //! Input: [`Photons`]. Output: what the passes that estimate light at points of their own read: kernels, sorted by cell. Cost:
 //! proportional to photons. No kernel is wider than a cell, and cells are as wide as the widest kernel that evenly spread photons
-//! have, 64³ at most. Source: Yao et al. 2010, section 6, for kernels; Green 2008 (particles in sorted cells). Photons straight
-//! from lights are left out, and those on specular surfaces.
+//! have, 64³ at most. Source: Yao et al. 2010, section 6, for kernels; Green 2008 (particles in sorted cells). [`SortedPhotons`]
+//! says which photons count.
 
 use super::photon_splatter::{self, gpu::Bandwidth as BandwidthUniform};
 use super::stable_sort::{Side, SortBuffers, StableSort};
@@ -41,10 +41,20 @@ pub(crate) const SLOTS: [Slot; 6] = [
 /// Most cells along each axis.
 const MOST_CELLS: u32 = 64;
 
+/// Which photons are sorted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum SortedPhotons {
+    /// Indirect light on diffuse surfaces.
+    OnDiffuse,
+    /// Light on rough metal, by the direction that it comes along: indirect, or straight from a flat lamp.
+    OnGlossy,
+}
+
 /// The pass.
 #[derive(Debug)]
 pub struct PhotonGrid {
     device: wgpu::Device,
+    sorted: SortedPhotons,
     layout: wgpu::BindGroupLayout,
     find_cells: wgpu::ComputePipeline,
     sort: StableSort,
@@ -69,7 +79,7 @@ pub struct PhotonGridResources {
 pub struct PhotonGridInputs<'a> {
     /// For the uniforms of this frame.
     pub queue: &'a wgpu::Queue,
-    /// To be sorted; hop 0 is left out.
+    /// To be sorted; of those on diffuse surfaces hop 0 is left out.
     pub photons: &'a Photons,
     /// Area of all surfaces, unit-frame lengths squared; sets the uniform density.
     pub area: f32,
@@ -81,24 +91,40 @@ pub struct PhotonGridInputs<'a> {
     pub timestamps: Option<&'a Timestamps>,
 }
 
+impl SortedPhotons {
+    /// Photons straight from a light are its direct light on diffuse surfaces.
+    fn first_slot(self, photons: &Photons) -> u32 {
+        match self {
+            Self::OnDiffuse => photons.count(),
+            Self::OnGlossy => 0,
+        }
+    }
+}
+
 impl PhotonGrid {
     /// The pass on this device. Needs no features and no more than default limits. `keeps_to_surfaces` as in
     /// [`PhotonSplatterConfig`](super::PhotonSplatterConfig).
-    pub fn new(device: &wgpu::Device, keeps_to_surfaces: bool) -> Self {
+    pub fn new(device: &wgpu::Device, sorted: SortedPhotons, keeps_to_surfaces: bool) -> Self {
         let layout = device::layout(device, "lightfall::PhotonGrid", wgpu::ShaderStages::COMPUTE, &SLOTS);
-        let surfaces = ("splat_keeps_to_surfaces", f64::from(u8::from(keeps_to_surfaces)));
+        let is_glossy = sorted == SortedPhotons::OnGlossy;
+        let surfaces = (
+            "splat_keeps_to_surfaces",
+            f64::from(u8::from(keeps_to_surfaces && !is_glossy)),
+        );
+        let glossy = ("grid_is_glossy", f64::from(u8::from(is_glossy)));
         let step = |label, entry_point| {
             let spec = ComputeSpec {
                 label,
                 source: wgsl::PHOTON_GRID,
                 entry_point,
                 layouts: &[&layout],
-                constants: &[surfaces],
+                constants: &[surfaces, glossy],
             };
             device::compute_pipeline(device, &spec)
         };
         Self {
             device: device.clone(),
+            sorted,
             find_cells: step("lightfall::PhotonGrid::find_cells", "find_cells"),
             sort: StableSort::new(device),
             find_first: step("lightfall::PhotonGrid::find_first", "find_first"),
@@ -114,13 +140,14 @@ impl PhotonGrid {
         resources: &mut PhotonGridResources,
         inputs: &PhotonGridInputs<'_>,
     ) {
-        let slots = photon_splatter::splatted_slots(inputs.photons).min(resources.slots);
+        let first_slot = self.sorted.first_slot(inputs.photons);
+        let slots = (inputs.photons.slots() - first_slot).min(resources.slots);
         let (groups, row) = dispatch_64(slots);
         let (bandwidth, widest) =
             photon_splatter::free_bandwidth(inputs.bandwidth, inputs.photons.count(), (inputs.area, inputs.radius));
         let params = gpu::GridParams {
             bandwidth,
-            first_slot: inputs.photons.count(),
+            first_slot,
             slot_count: slots,
             row,
             cells: cells(widest),
@@ -162,7 +189,7 @@ impl PhotonGrid {
 }
 
 impl PhotonGridResources {
-    /// Bytes for photon buffers of `slots` slots, hop 0 not counted.
+    /// Bytes for so many slots of photon buffers, those of hop 0 counted where they are sorted.
     pub fn size_in_bytes(slots: u32) -> u64 {
         let params = size_of::<gpu::GridParams>() as u64;
         let splats = u64::from(slots.max(1)) * photon_splatter::SPLAT_BYTES;
@@ -173,8 +200,8 @@ impl PhotonGridResources {
     ///
     /// # Errors
     /// [`Error::LimitExceeded`].
-    pub fn new(device: &wgpu::Device, photons: &Photons) -> Result<Self, Error> {
-        let slots = photon_splatter::splatted_slots(photons);
+    pub fn new(device: &wgpu::Device, photons: &Photons, sorted: SortedPhotons) -> Result<Self, Error> {
+        let slots = photons.slots() - sorted.first_slot(photons);
         photon_splatter::check_splats(device, slots)?;
         let storage = |label, bytes| device::buffer(device, label, bytes, wgpu::BufferUsages::STORAGE);
         Ok(Self {

@@ -38,6 +38,7 @@ pub(crate) mod gpu {
         pub(crate) shadow_map_size: u32,
         pub(crate) direct_weight: f32,
         pub(crate) indirect_weight: f32,
+        pub(crate) skips_glossy: u32,
     }
 
     /// Twin of `SpecularPath` in `shaders/pass/specular_paths/params.wgsl`.
@@ -138,6 +139,8 @@ pub struct SpecularPathsInputs<'a> {
     pub radiance: &'a Irradiance,
     /// Factors of light straight from a source, by way of the surface that the eye sees alone, and of all other light.
     pub weights: [f32; 2],
+    /// Whether pixels that show rough metal are left out: [`GlossyLight`](super::GlossyLight) lights them.
+    pub skips_glossy: bool,
     /// Turns rough reflections: another in each frame that is accumulated, constant in real time.
     pub sample_offset: u32,
     /// Sink for GPU time.
@@ -161,6 +164,7 @@ impl SpecularPathsInputs<'_> {
             shadow_map_size: self.shadow_maps.size(),
             direct_weight: self.weights[0],
             indirect_weight: self.weights[1],
+            skips_glossy: u32::from(self.skips_glossy),
         }
     }
 }

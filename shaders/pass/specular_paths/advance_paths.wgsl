@@ -64,7 +64,7 @@ fn advanced(before: SpecularPath, index: u32, pixel: vec2u) -> SpecularPath {
         return path;
     }
     let scatterer = scatter_by_lobe(lobe, n, (hit.lobe & HIT_BACK) == 0u, color);
-    let punctual = specular_punctual(scatterer, p, -ray.direction);
+    let punctual = punctual_light(scatterer, p, -ray.direction, params.light_count, params.shadow_map_size, false);
     path.radiance += params.indirect_weight * path.throughput * punctual;
     if params.step + 1u == params.steps {
         return path;

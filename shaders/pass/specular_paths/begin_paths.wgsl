@@ -28,31 +28,23 @@ fn begin_paths(@builtin(global_invocation_id) id: vec3u) {
     paths[index] = SpecularPath(vec3f(0.0), 0u, before);
     let bits = textureLoad(surface_texture, at, 0).r >> 16u;
     let lobe = bits & LOBE_BITS;
-    if !lobe_is_specular(lobe) {
+    if !lobe_is_specular(lobe) || (params.skips_glossy == 1u && lobe_is_glossy(lobe)) {
         return;
     }
     let receiver = receiver_at(pixel);
     if !receiver.is_seen {
         return;
     }
-    var outgoing = -view.eye.xyz;
-    if view.eye.w > 0.0 {
-        outgoing = normalize(view.eye.xyz - receiver.position);
-    }
-    // An interpolated normal may turn away from the eye where the surface does not.
-    let shading = g_buffer_normal(view, textureLoad(normal_texture, at, 0));
-    let normal = select(receiver.normal, shading, dot(shading, outgoing) > SPECULAR_GRAZING);
-    let color = textureLoad(base_color_texture, at, 0).rgb;
-    let scatterer = scatter_by_lobe(lobe, normal, (bits & HIT_BACK) == 0u, color);
-    before += params.direct_weight * specular_punctual(scatterer, receiver.position, outgoing);
+    let outgoing = eye_outgoing(receiver.position);
+    let scatterer = eye_scatterer(receiver, at, bits, outgoing);
+    let punctual =
+        punctual_light(scatterer, receiver.position, outgoing, params.light_count, params.shadow_map_size, false);
+    before += params.direct_weight * punctual;
     paths[index].radiance = before;
     let scattering = scatter_sample(scatterer, outgoing, specular_random(pixel, 0u));
     if all(scattering.weight == vec3f(0.0)) {
         return;
     }
-    rays[index] = specular_ray(receiver.position, normal, scattering.direction);
+    rays[index] = specular_ray(receiver.position, scatterer.frame[2], scattering.direction);
     paths[index] = SpecularPath(scattering.weight, 1u, before);
 }
-
-// Cosine below which an interpolated normal is not trusted.
-const SPECULAR_GRAZING: f32 = 0.01;

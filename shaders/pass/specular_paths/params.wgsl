@@ -18,6 +18,8 @@ struct Params {
     // Factors of light that comes straight from a source, and of all other light
     direct_weight: f32,
     indirect_weight: f32,
+    // 1: what is glossy to the eye is left out
+    skips_glossy: u32,
 }
 
 struct SpecularPath {
@@ -39,32 +41,6 @@ fn specular_random(pixel: vec2u, surface: u32) -> vec4f {
 fn specular_no_ray() -> SurfaceRay {
     let away = vec3f(0.57735027);
     return SurfaceRay(8.0 * away, octahedral_pack(away), away, 0u);
-}
-
-// Radiance that a rough surface sends towards the eye of lights that no ray can run into: point lights, spots and suns.
-fn specular_punctual(scatterer: Scatterer, p: vec3f, outgoing: vec3f) -> vec3f {
-    var sum = vec3f(0.0);
-    if scatter_is_smooth(scatterer) {
-        return sum;
-    }
-    for (var i = 0u; i < params.light_count; i++) {
-        if light_is_met(lights[i]) {
-            continue;
-        }
-        var incoming = -lights[i].direction;
-        if lights[i].kind != LIGHT_DIRECTIONAL {
-            incoming = normalize(lights[i].position - p);
-        }
-        let scattered = scatter_evaluate(scatterer, outgoing, incoming).rgb;
-        // Irradiance of a surface across the light.
-        let e = light_irradiance(lights[i], p, incoming);
-        let n = scatterer.frame[2];
-        let side = select(-n, n, dot(n, incoming) > 0.0);
-        if any(scattered * e > vec3f(0.0)) && is_lit(lights[i], p, side, params.shadow_map_size) {
-            sum += scattered * e;
-        }
-    }
-    return sum;
 }
 
 // The ray that goes on from a surface.
