@@ -109,7 +109,7 @@
 //!
 //! # What is not modelled
 //!
-//! A surface is diffuse, metal or glass, none of them at once, and environments light nothing.
+//! A surface is diffuse, metal or glass, none of them at once, and an environment lights surfaces as some suns do.
 //! [`Plan::simplifications`](frame::Plan::simplifications) names what this means for a given scene.
 
 #![cfg_attr(docsrs, feature(doc_cfg))]
