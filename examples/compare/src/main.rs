@@ -14,6 +14,10 @@
 //! reference, cut off at 1, sRGB; 67 pixels per degree of the field of view. A difference in a pixel that is not compared
 //! reaches the compared ones around it as far as the eye blurs it, a few pixels.
 //!
+//! With `--minus FILE` the reference is what is left of it without that image: a caustic is all light without what paths from the eye
+//! find of it. With `--inside SHARE` only pixels count where the reference, mean of channels, is more than so much of what half a
+//! percent of them exceed.
+//!
 //! With `--png`, writes image, reference and relative error side by side; [`common::difference`] explains the colours.
 //!
 //! Both files hold linear radiance in channels R, G, B; `common/truth_file.rs` lists the channels of a reference that
@@ -53,7 +57,16 @@ struct Arguments {
     /// Writes image, reference and relative error side by side
     #[arg(long, value_name = "DIFF.png")]
     png: Option<PathBuf>,
+    /// Subtracted from the reference: an EXR file of the same size
+    #[arg(long, value_name = "PART.exr")]
+    minus: Option<PathBuf>,
+    /// Compares bright pixels alone: more than this share of what half a percent of the reference's exceed
+    #[arg(long, value_name = "SHARE")]
+    inside: Option<f32>,
 }
+
+/// Share of the pixels that are brighter than what `--inside` is measured by.
+const BRIGHTEST: f64 = 0.005;
 
 fn main() -> ExitCode {
     let arguments: Arguments = arguments::parse("compare");
@@ -76,7 +89,13 @@ fn main() -> ExitCode {
 /// The report, and whether the image is finite.
 fn run(arguments: &Arguments) -> Result<(Value, bool), String> {
     let image = truth_file::read_image(&arguments.ours)?;
-    let truth = truth_file::read_truth(&arguments.truth)?;
+    let mut truth = truth_file::read_truth(&arguments.truth)?;
+    if let Some(path) = &arguments.minus {
+        subtract(&mut truth.image, path)?;
+    }
+    if let Some(share) = arguments.inside {
+        keep_bright(&mut truth, share);
+    }
     let between = |error| {
         format!(
             "{} against {}: {error}",
@@ -94,6 +113,41 @@ fn run(arguments: &Arguments) -> Result<(Value, bool), String> {
         write_picture(path, &picture(&image, &truth, &display))?;
     }
     Ok((figures, comparison.finite))
+}
+
+fn subtract(image: &mut Image, path: &Path) -> Result<(), String> {
+    let part = truth_file::read_image(path)?;
+    if [part.width, part.height] != [image.width, image.height] {
+        return Err(format!(
+            "{}: is {}×{}, the reference {}×{}",
+            path.display(),
+            part.width,
+            part.height,
+            image.width,
+            image.height
+        ));
+    }
+    let values = image.rgb.as_flattened_mut().iter_mut();
+    values
+        .zip(part.rgb.as_flattened())
+        .for_each(|(whole, part)| *whole -= part);
+    Ok(())
+}
+
+/// Leaves pixels out that are not brighter than a share of the brightest ones.
+fn keep_bright(truth: &mut Truth, share: f32) {
+    let brightness = |pixel: usize| truth.image.rgb[pixel].iter().sum::<f32>();
+    let compared = (0..truth.valid.len()).filter(|&pixel| truth.is_compared(pixel));
+    let mut all: Vec<f32> = compared.map(brightness).collect();
+    all.sort_by(f32::total_cmp);
+    let place = ((1.0 - BRIGHTEST) * all.len() as f64) as usize;
+    let Some(&bright) = all.get(place.min(all.len().saturating_sub(1))) else {
+        return;
+    };
+    let kept: Vec<bool> = (0..truth.valid.len())
+        .map(|pixel| truth.valid[pixel] && brightness(pixel) > share * bright)
+        .collect();
+    truth.valid = kept;
 }
 
 /// Means of the FLIP error map.

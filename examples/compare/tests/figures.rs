@@ -242,3 +242,20 @@ fn bad_input_gets_one_line_status_two_and_no_file() {
         assert!(!PathBuf::from(&png).exists(), "{files:?}");
     }
 }
+
+#[test]
+fn a_part_is_subtracted_from_the_reference_and_bright_pixels_are_compared_alone() {
+    let folder = Folder::new("minus");
+    // What is left: 1 in eight pixels, 0.001 elsewhere.
+    let bright: Vec<_> = (0..8).map(|i| (100 + i, 3.0)).collect();
+    let truth = folder.grey("truth.exr", 2.001, &bright);
+    let part = folder.grey("part.exr", 2.0, &[]);
+    let twice: Vec<_> = (0..8).map(|i| (100 + i, 2.0)).collect();
+    let ours = folder.grey("ours.exr", 5.0, &twice);
+    let report = report(&[&ours, &truth, "--minus", &part, "--inside", "0.1"]);
+    assert_eq!(report["pixels"], 8);
+    assert!((report["bias"].as_f64().unwrap() - 1.0).abs() < 1e-6, "{report}");
+    let other = folder.path("missing.exr");
+    let output = compare(&[&ours, &truth, "--minus", &other]);
+    assert_eq!(output.status.code(), Some(2));
+}
