@@ -92,7 +92,7 @@ struct Arguments {
     #[arg(long, value_name = "FILE|R,G,B")]
     environment: Option<String>,
     /// Turns the environment, degrees, counter-clockwise seen from above
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, requires = "environment")]
     environment_rotation: f64,
     /// Any field of Settings, repeatable; an unknown key lists them all
     #[arg(long, value_name = "KEY=VALUE")]

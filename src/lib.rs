@@ -23,7 +23,8 @@
 //!
 //! # A frame
 //!
-//! 1. [`set_scene`](frame::GiRenderer::set_scene): what there is. Returns the unit frame.
+//! 1. [`set_scene`](frame::GiRenderer::set_scene): what there is. Returns the unit frame. Before it, where an environment's image
+//!    has changed, [`set_environment`](frame::GiRenderer::set_environment).
 //! 2. [`prepare`](frame::GiRenderer::prepare): the geometry, and every camera of the frame.
 //! 3. [`record_scene`](frame::GiRenderer::record_scene), once: shadow maps, environment maps, photons.
 //! 4. [`record_view`](frame::GiRenderer::record_view), for each camera: G-buffer, direct and indirect irradiance, their

@@ -108,12 +108,19 @@ fn the_eye_and_mirrors_see_the_texel_that_lies_in_their_direction() {
     let mut scene = open_plane(mirror, 0.0);
     scene.environments.push(image.clone());
     scene.lights.push(sky(Some(0), rotation));
-    for kind in [TracerKind::Bvh, TracerKind::ImageSpace] {
+    // And from a corner, far from the middle of the region.
+    let mut away = scene.clone();
+    away.cameras[0].transform.translation += DVec3::new(95.0, 0.0, 95.0);
+    for (kind, scene) in [
+        (TracerKind::Bvh, &scene),
+        (TracerKind::ImageSpace, &scene),
+        (TracerKind::Bvh, &away),
+    ] {
         let settings = Settings {
             tracer_kind: kind,
             ..settings()
         };
-        let seen = render(&gpu, &scene, &settings, size, Component::All);
+        let seen = render(&gpu, scene, &settings, size, Component::All);
         let mut counted = [0; 2];
         for (pixel, mut direction) in seen.iter().zip(directions(&scene.cameras[0], size)) {
             // Close to the horizon the plane ends.
@@ -272,6 +279,29 @@ fn suns_leave_room_for_other_lights_and_missing_images_are_errors() {
     assert!(error.to_string().contains("patches"), "{error}");
     renderer.set_scene(queue, &summary, &scene.lights).unwrap();
     assert_eq!(shadow_layers(&renderer), 20 * 6 + 44);
+    // Another image, and a turn of it, before and after `set_scene`.
+    scene.lights = vec![sky(Some(0), 0.0)];
+    let mut offline = Offline::new(&gpu, scene.clone(), &settings, 0, [16, 16], Component::All).unwrap();
+    let mut picture = |scene: &Scene| {
+        offline.set_scene(scene.clone()).unwrap();
+        offline.render_frame(None).unwrap();
+        offline.read().unwrap()
+    };
+    let first = picture(&scene);
+    let mut turned = scene.clone();
+    turned.lights = vec![sky(Some(0), 1.5)];
+    assert!(picture(&turned) != first);
+    let mut reversed = scene.clone();
+    reversed.environments[0].rgb.reverse();
+    assert!(picture(&reversed) != first);
+    let back = picture(&scene);
+    let off: f32 = back
+        .iter()
+        .flatten()
+        .zip(first.iter().flatten())
+        .map(|(a, b)| (a - b).abs())
+        .sum();
+    assert!(off <= 1e-4 * first.iter().flatten().sum::<f32>(), "{off}");
     // Nothing shines: no sun, and no picture either.
     scene.lights = vec![sky(Some(0), 0.0)];
     scene.environments = vec![black];

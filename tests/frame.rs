@@ -640,7 +640,7 @@ fn an_environment_without_suns_leaves_a_scene_black_and_the_plan_says_so() {
     assert!(offline.read().unwrap().iter().flatten().all(|&v| v == 0.0));
     let plan = offline.renderer.plan().unwrap().to_string();
     assert!(plan.contains("no light but an environment"), "{plan}");
-    assert!(plan.contains("shines for the eye alone"), "{plan}");
+    assert!(plan.contains("lights no diffuse surface"), "{plan}");
     assert!(offline.renderer.shadow_maps().is_none() && offline.renderer.photons().is_none());
     // The unit of flux is near what it emits all the same, image and all.
     let means = [0.625, 0.75, 2.0];

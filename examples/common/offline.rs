@@ -61,7 +61,7 @@ impl<'a> Offline<'a> {
         let bvh = settings.tracer_kind.uses_triangles().then(bvh).transpose()?;
         let mut renderer = GiRenderer::new(device, settings)?;
         let summary = SceneSummary::of(&scene)?;
-        renderer.set_environment(queue, scene.environments.first())?;
+        renderer.set_environment(queue, scene.environment_image())?;
         renderer.set_scene(queue, &summary, &scene.lights)?;
         renderer.place_env_maps_blocking(queue, &mut geometry)?;
         let weight = |on: bool| if on { 1.0 } else { 0.0 };
@@ -169,9 +169,9 @@ impl<'a> Offline<'a> {
             }
         }
         self.summary = SceneSummary::of(&scene)?;
-        if scene.environments != self.scene.environments {
+        if scene.environment_image() != self.scene.environment_image() {
             self.renderer
-                .set_environment(&self.gpu.queue, scene.environments.first())?;
+                .set_environment(&self.gpu.queue, scene.environment_image())?;
         }
         self.scene = scene;
         self.renderer.geometry_changed();

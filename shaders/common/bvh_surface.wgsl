@@ -131,7 +131,7 @@ fn bvh_lobe(surface: BvhSurface) -> u32 {
     let rough_metallic = bvh_texture(bvh_materials[m].metallic_roughness_texture, surface.tex_coord).gb;
     return lobe_of(
         bvh_materials[m].metallic * rough_metallic.y,
-        bvh_materials[m].roughness * rough_metallic.x,
+        lobe_textured(bvh_materials[m].roughness, rough_metallic.x),
         bvh_materials[m].transmission,
         bvh_materials[m].index_of_refraction,
     );

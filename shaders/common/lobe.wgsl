@@ -34,6 +34,11 @@ fn lobe_of(metallic: f32, roughness: f32, transmission: f32, index_of_refraction
     return select(LOBE_DIFFUSE, lobe_metal(roughness), metallic > 0.5);
 }
 
+// Roughness times that of a texture, which scales no Phong exponent.
+fn lobe_textured(roughness: f32, texel: f32) -> f32 {
+    return select(roughness * texel, roughness, roughness < 0.0);
+}
+
 fn lobe_kind(lobe: u32) -> u32 {
     return lobe & LOBE_KIND;
 }

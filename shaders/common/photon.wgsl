@@ -20,7 +20,7 @@ const PHOTON_BACK: u32 = 2048u;
 // It came by way of specular surfaces alone, and photons of a caustic map stand for it.
 const PHOTON_CAUSTIC: u32 = 4096u;
 // It came straight from a flat light: set beside PHOTON_STARTED and PHOTON_FIRST_HIT.
-const PHOTON_OF_SURFACE: u32 = 16384u;
+const PHOTON_OF_FLAT: u32 = 16384u;
 // What a path keeps from its emission: bits 16 to 23 the cell that it started in, bits 24 to 31 how much more densely photons
 // start there than if they were spread evenly, 0 if they are.
 const PHOTON_EMISSION: u32 = 0xffff0000u;

@@ -33,7 +33,15 @@ fn view_direction(pixel: vec2f) -> vec3f {
     if view.eye.w == 0.0 {
         return view.eye.xyz;
     }
-    return normalize(g_buffer_position(view, pixel, 0.5) - view.eye.xyz);
+    // From the end of the depth range that is further off: near the eye the difference has no digits.
+    let uv = (pixel + 0.5) / vec2f(view.size);
+    let at = vec2f(2.0 * uv.x - 1.0, 1.0 - 2.0 * uv.y);
+    let ends = array(
+        view.inverse_view_projection * vec4f(at, 0.0, 1.0),
+        view.inverse_view_projection * vec4f(at, 1.0, 1.0),
+    );
+    let far = select(ends[1], ends[0], abs(ends[0].w) < abs(ends[1].w));
+    return normalize(select(1.0, -1.0, far.w < 0.0) * (far.xyz - view.eye.xyz * far.w));
 }
 
 @fragment

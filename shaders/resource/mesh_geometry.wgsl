@@ -69,7 +69,7 @@ fn surface_at(v: Vertex, front_facing: bool) -> Surface {
     let rough_metallic = textureSample(metallic_roughness_texture, material_sampler, v.tex_coord).gb;
     let lobe = lobe_of(
         material.metallic * rough_metallic.y,
-        material.roughness * rough_metallic.x,
+        lobe_textured(material.roughness, rough_metallic.x),
         material.transmission,
         material.index_of_refraction,
     );

@@ -242,8 +242,9 @@ impl GiRenderer {
         })
     }
 
-    /// Gives the image that an environment light refers to, [`LightKind::Environment`]; `None` drops it. Uploads it, and divides it
-    /// into suns with the next `set_scene`: call it when the image changes, not every frame.
+    /// Gives the image that an environment light refers to, whatever the index in [`LightKind::Environment`]: of a `Scene` that of
+    /// [`Scene::environment_image`](crate::scene::Scene::environment_image). `None` drops it. Uploads it, and divides it into suns with
+    /// the next `set_scene`: call it before that, when the image changes, not every frame.
     ///
     /// # Errors
     /// As [`EnvironmentImage::validate`]; [`Error::LimitExceeded`] for one that is larger than a texture may be. The old one stays
@@ -253,6 +254,10 @@ impl GiRenderer {
             Some(image) => Environment::new(&self.device, queue, image)?,
             None => Environment::black(&self.device)?,
         };
+        if let Some(state) = &self.state {
+            let light = state.lights.iter().find(|l| l.is_environment());
+            self.environment.write(queue, &state.frame, light);
+        }
         self.environment_image = image.cloned();
         self.sun_cache = None;
         self.revision += 1;
@@ -291,8 +296,8 @@ impl GiRenderer {
         let plan = Plan::for_scene(summary, &self.settings);
         self.allocate(queue, &plan, &sources)?;
         let reach = |lights: &[Light]| {
-            lights
-                .iter()
+            let shining = lights.iter().filter(|l| !l.is_environment());
+            shining
                 .map(|l| (l.kind, l.strength() == DVec3::ZERO))
                 .collect::<Vec<_>>()
         };

@@ -106,8 +106,8 @@ impl Plan {
             (true, false, GlossyMethod::Paths) => (false, "settings follow paths from rough metal".to_owned()),
             (true, false, GlossyMethod::Photons) => (true, format!("{}, where rough", summary.metals.join(", "))),
         };
-        let has_surfaces = suns(summary, settings) > 0 || !summary.emissive_triangles.is_empty();
-        let has_extent = summary.lights_with_extent > 0 || has_surfaces;
+        let shines_from_all_over = suns(summary, settings) > 0 || !summary.emissive_triangles.is_empty();
+        let has_extent = summary.lights_with_extent > 0 || shines_from_all_over;
         let soft = match has_extent {
             false => "no light has an extent".to_owned(),
             true => format!(
@@ -333,8 +333,14 @@ fn simplifications(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
     }
     match (summary.environment_lights, settings.environment_suns) {
         (0, _) => {}
-        (_, 0) => notes.push("the environment shines for the eye alone".to_owned()),
-        (_, suns) => notes.push(format!("the environment gives the light of at most {suns} suns")),
+        (_, 0) => notes.push("the environment lights no diffuse surface".to_owned()),
+        (_, suns) => notes.push(format!(
+            "the environment lights diffuse surfaces as at most {suns} suns{}",
+            match settings.first_hits {
+                FirstHits::ShadowMaps => ", whose photons start at their middles",
+                FirstHits::Traced => "",
+            }
+        )),
     }
     if summary.lights_with_extent > 0 {
         let photons = match settings.first_hits {
@@ -472,7 +478,7 @@ mod tests {
         assert_eq!(on(&plan(1, 1, 0)), on(&dark));
         assert_eq!(plan(2, 1, 0).stages, one.stages);
         assert!(plan(1, 1, 0).to_string().contains("no light but an environment"));
-        assert!(plan(2, 1, 0).to_string().contains("shines for the eye alone"));
+        assert!(plan(2, 1, 0).to_string().contains("lights no diffuse surface"));
         let lit = plan(1, 1, 9);
         assert!(
             [Stage::DirectLight, Stage::SoftShadow, Stage::PhotonEmitter]
@@ -480,7 +486,7 @@ mod tests {
                 .all(|&s| lit.is_on(s))
         );
         assert!(lit.to_string().contains("9 sun(s) of the environment"), "{lit}");
-        assert!(lit.to_string().contains("at most 9 suns"), "{lit}");
+        assert!(lit.to_string().contains("at most 9 suns, whose photons"), "{lit}");
         assert!(one.simplifications.is_empty());
     }
 

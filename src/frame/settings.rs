@@ -149,7 +149,7 @@ pub struct Settings {
     /// square.
     pub env_map_size: u32,
     /// Suns that stand for an environment, 0 to 48, as parallel lights with an extent. More are nearer to its true light; each costs
-    /// a shadow map and a search for penumbrae. 0: it shines for the eye alone.
+    /// a shadow map and a search for penumbrae. 0: it is seen, and lights no diffuse surface.
     pub environment_suns: u32,
     /// Texels along a layer of a shadow map. Finer sharpens shadow edges, direct and in first hits; costs as the square.
     pub shadow_map_size: u32,

@@ -4,8 +4,8 @@
 //! × lights that face them, one texel fetch each. With [`Visibility`], each light counts by its layer; without, it is
 //! tested here and its shadow is hard. A receiver is lit where it lies no further than the plane of the surface that its
 //! shadow-map texel holds, so flat surfaces need no bias; and where that texel saw something behind the receiver's own
-//! plane, which cannot be in the way. Source: deferred shading as in Yao et al. 2010, section 7. Limits: a lamp of some
-//! extent gives the irradiance of a point in its middle, unless it is flat; what lies outside the region is not shadowed from directional
+//! plane, which cannot be in the way. Source: deferred shading as in Yao et al. 2010, section 7. Limits: a bulb or spot of some
+//! extent gives the irradiance of a point in its middle; what lies outside the region is not shadowed from directional
 //! light, and geometry further than two unit-frame lengths towards such a light does not shade.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};

@@ -103,7 +103,7 @@ impl SortedPhotons {
 
 impl PhotonGrid {
     /// The pass on this device. Needs no features and no more than default limits. `keeps_to_surfaces` as in
-    /// [`PhotonSplatterConfig`](super::PhotonSplatterConfig).
+    /// [`PhotonSplatterConfig`](super::PhotonSplatterConfig); photons on rough metal do not.
     pub fn new(device: &wgpu::Device, sorted: SortedPhotons, keeps_to_surfaces: bool) -> Self {
         let layout = device::layout(device, "lightfall::PhotonGrid", wgpu::ShaderStages::COMPUTE, &SLOTS);
         let is_glossy = sorted == SortedPhotons::OnGlossy;

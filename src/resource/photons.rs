@@ -16,7 +16,8 @@ pub struct Photon {
     /// Low two bits: a [`PhotonState`]. Bits 2 to 7: bits 0 to 5 of the surface's lobe, 0 if it is diffuse. Bit 8: the path came
     /// straight from its light. Bit 9: the tracer is not sure of the hop. Bit 10: the hop begins here, at its light, and is
     /// still to be traced; `position`, `normal` and `direction` are those of its start. Bit 11: the surface's back is hit. Bit 12: it
-    /// came by way of metal and glass alone, in a [`PhotonMap::Global`]. Bit 13, beside bit 10: the light's rays are parallel. Bits 16
+    /// came by way of metal and glass alone, in a [`PhotonMap::Global`]. Bit 13, beside bit 10: the light's rays are parallel. Bit 14, beside
+    /// bit 8 or 10: the light is flat. Bits 16
     /// to 31, the same for all hops of a path, and 0 after its end: see [`EmissionCells`](super::EmissionCells); bits 16 to 23 are
     /// the cell that it started in, bits 24 to 31 b where photons start 2^((b − 128) / 16) times as densely there as if they were
     /// spread evenly, 0 where they are. Others 0.
@@ -33,7 +34,7 @@ pub struct Photon {
     pub direction: u32,
     /// Reflectance of the surface, 11-11-10.
     pub reflectance: u32,
-    /// Bits 0 to 7: index of the light that the path began at, environments not counted, or behind them of the lamp. Bits 8 to 15:
+    /// Bits 0 to 7: index of the light that the path began at, in [`Lights`](super::Lights). Bits 8 to 15:
     /// bits 6 to 13 of the surface's lobe. Bits 16 to 31: [`Instance::surface`](crate::scene::Instance::surface) of what was hit, 0
     /// where it has none.
     pub light_and_surface: u32,
@@ -100,7 +101,7 @@ impl Photon {
         steps(rgb[0], 2047.0) | steps(rgb[1], 2047.0) << 11 | steps(rgb[2], 1023.0) << 22
     }
 
-    /// Index of the light that the path began at, environments not counted, or behind them of the lamp.
+    /// Index of the light that the path began at, in [`Lights`](super::Lights).
     pub fn light(&self) -> u32 {
         self.light_and_surface & 0xff
     }

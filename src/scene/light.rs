@@ -122,7 +122,7 @@ impl Light {
         self.strength() * per_strength
     }
 
-    /// Whether light comes from all around. The image-space passes model all other kinds, and pass over this one.
+    /// Whether light comes from all around. Passes take [`Sun`](super::Sun)s for it.
     pub fn is_environment(&self) -> bool {
         matches!(self.kind, LightKind::Environment { .. })
     }

@@ -22,7 +22,7 @@ pub struct Material {
     pub roughness: f32,
     /// Of a metal: a Phong lobe of this exponent, 1 to 60 000, instead of GGX. glTF has none; for the scenes of papers.
     pub phong_exponent: Option<f32>,
-    /// Multiplies `roughness` (green) and `metallic` (blue). Index into the scene's textures.
+    /// Multiplies `roughness` (green; no Phong exponent) and `metallic` (blue). Index into the scene's textures.
     pub metallic_roughness_texture: Option<usize>,
     /// Emitted radiance, W/m²/sr, linear RGB, front side.
     pub emission: [f32; 3],
@@ -82,7 +82,10 @@ impl Material {
 
     /// Roughness as shaders take it: that of GGX, or minus the exponent of a Phong lobe.
     pub(crate) fn lobe_roughness(&self) -> f32 {
-        self.phong_exponent.map_or(self.roughness, |exponent| -exponent)
+        match self.phong_exponent {
+            Some(exponent) if !self.is_transmissive() => -exponent,
+            _ => self.roughness,
+        }
     }
 
     /// Checks every factor and texture index.

@@ -120,6 +120,15 @@ impl Scene {
         light.flux(region_radius) * image.map_or(DVec3::ONE, EnvironmentImage::mean)
     }
 
+    /// The image that the environment light refers to, if there is one.
+    pub fn environment_image(&self) -> Option<&EnvironmentImage> {
+        let index = self.lights.iter().find_map(|light| match light.kind {
+            LightKind::Environment { image, .. } => image,
+            _ => None,
+        });
+        index.and_then(|i| self.environments.get(i))
+    }
+
     /// Triangles over all instances.
     pub fn triangle_count(&self) -> usize {
         self.instances

@@ -87,11 +87,6 @@ impl SceneSummary {
         Ok(())
     }
 
-    /// Whether anything shines.
-    pub fn is_lit(&self) -> bool {
-        self.lights > 0 || !self.emissive_triangles.is_empty()
-    }
-
     /// Reads it off a scene.
     ///
     /// # Errors

@@ -24,11 +24,11 @@ pub struct Sun {
 }
 
 impl Sun {
-    /// Divides an environment, of the same radiance from everywhere without an image, into at most `count` suns: fewer where fewer
+    /// Divides an environment, a valid image or without one the same radiance from everywhere, into at most `count` suns: fewer where fewer
     /// texels shine. Cost: a few looks at each texel.
     pub fn divide(image: Option<&EnvironmentImage>, count: usize) -> Vec<Self> {
         let sky = Sky::new(image);
-        let mut parts: Vec<Part> = Vec::with_capacity(count);
+        let mut parts: Vec<Part> = Vec::new();
         if count > 0 {
             parts.extend(sky.part([0, sky.columns, 0, sky.rows]));
         }

@@ -91,9 +91,12 @@ fn run(arguments: &Arguments) -> Result<(Value, bool), String> {
     let image = truth_file::read_image(&arguments.ours)?;
     let mut truth = truth_file::read_truth(&arguments.truth)?;
     if let Some(path) = &arguments.minus {
-        subtract(&mut truth.image, path)?;
+        subtract(&mut truth, path)?;
     }
     if let Some(share) = arguments.inside {
+        if !(share.is_finite() && share >= 0.0) {
+            return Err(format!("--inside {share}: expected a share, 0 or more"));
+        }
         keep_bright(&mut truth, share);
     }
     let between = |error| {
@@ -115,8 +118,14 @@ fn run(arguments: &Arguments) -> Result<(Value, bool), String> {
     Ok((figures, comparison.finite))
 }
 
-fn subtract(image: &mut Image, path: &Path) -> Result<(), String> {
-    let part = truth_file::read_image(path)?;
+/// What is left of a reference; both errors are in it.
+fn subtract(truth: &mut Truth, path: &Path) -> Result<(), String> {
+    let Truth {
+        image: part,
+        standard_error,
+        ..
+    } = truth_file::read_truth(path)?;
+    let image = &mut truth.image;
     if [part.width, part.height] != [image.width, image.height] {
         return Err(format!(
             "{}: is {}×{}, the reference {}×{}",
@@ -131,6 +140,14 @@ fn subtract(image: &mut Image, path: &Path) -> Result<(), String> {
     values
         .zip(part.rgb.as_flattened())
         .for_each(|(whole, part)| *whole -= part);
+    truth.standard_error = match (truth.standard_error.take(), standard_error) {
+        (Some(mut whole), Some(part)) => {
+            let errors = whole.as_flattened_mut().iter_mut();
+            errors.zip(part.as_flattened()).for_each(|(w, p)| *w = w.hypot(*p));
+            Some(whole)
+        }
+        (whole, part) => whole.or(part),
+    };
     Ok(())
 }
 

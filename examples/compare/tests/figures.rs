@@ -255,7 +255,13 @@ fn a_part_is_subtracted_from_the_reference_and_bright_pixels_are_compared_alone(
     let report = report(&[&ours, &truth, "--minus", &part, "--inside", "0.1"]);
     assert_eq!(report["pixels"], 8);
     assert!((report["bias"].as_f64().unwrap() - 1.0).abs() < 1e-6, "{report}");
-    let other = folder.path("missing.exr");
-    let output = compare(&[&ours, &truth, "--minus", &other]);
-    assert_eq!(output.status.code(), Some(2));
+    let missing = folder.path("missing.exr");
+    for [option, value] in [
+        ["--minus", missing.as_str()],
+        ["--inside", "nan"],
+        ["--inside=-1", "--png=x.png"],
+    ] {
+        let output = compare(&[&ours, &truth, option, value]);
+        assert_eq!(output.status.code(), Some(2), "{option} {value}");
+    }
 }

@@ -118,7 +118,7 @@ fn surface_start(light: Light, sequence_index: u32, photon_count: u32) -> Surfac
 fn photon_started(start: SurfaceStart, light_index: u32, direction: vec3f, boost: f32, kept: u32) -> Photon {
     return Photon(
         start.position,
-        PHOTON_EMPTY | PHOTON_STARTED | select(0u, PHOTON_OF_SURFACE, lights[light_index].kind == LIGHT_AREA) | kept,
+        PHOTON_EMPTY | PHOTON_STARTED | select(0u, PHOTON_OF_FLAT, lights[light_index].kind == LIGHT_AREA) | kept,
         start.flux / boost,
         boost,
         octahedral_pack(start.normal),

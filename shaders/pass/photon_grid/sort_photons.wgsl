@@ -17,7 +17,7 @@ fn is_sorted(photon: Photon) -> bool {
         return photon_is_indirect(photon.state);
     }
     // Of light straight from a source only that of flat lamps: the others shine from single directions.
-    let is_punctual = (photon.state & (PHOTON_FIRST_HIT | PHOTON_OF_SURFACE)) == PHOTON_FIRST_HIT;
+    let is_punctual = (photon.state & (PHOTON_FIRST_HIT | PHOTON_OF_FLAT)) == PHOTON_FIRST_HIT;
     let is_stored = (photon.state & PHOTON_STATE_MASK) == PHOTON_STORED && !is_punctual;
     return is_stored && lobe_is_glossy(photon_lobe(photon.state, photon.light_and_surface));
 }

@@ -125,7 +125,7 @@ fn first_photon(start: Photon) -> Photon {
         spread = Spread(0.0, inverseSqrt(max(start.density, 1e-20)), 0.0);
     }
     var photon = arrived(start, start.flux, direction, spread, hit);
-    photon.state |= PHOTON_FIRST_HIT | (start.state & PHOTON_OF_SURFACE);
+    photon.state |= PHOTON_FIRST_HIT | (start.state & PHOTON_OF_FLAT);
     return photon;
 }
 

@@ -9,7 +9,7 @@ fn scatter_at(surface: BvhSurface, direction: vec3f) -> Scatterer {
         is_front,
         bvh_base_color(surface),
         bvh_materials[m].metallic * rough_metallic.y,
-        bvh_materials[m].roughness * rough_metallic.x,
+        lobe_textured(bvh_materials[m].roughness, rough_metallic.x),
         bvh_materials[m].transmission,
         bvh_materials[m].index_of_refraction,
     );
