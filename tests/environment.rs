@@ -108,9 +108,9 @@ fn the_eye_and_mirrors_see_the_texel_that_lies_in_their_direction() {
     let mut scene = open_plane(mirror, 0.0);
     scene.environments.push(image.clone());
     scene.lights.push(sky(Some(0), rotation));
-    // And from a corner, far from the middle of the region.
+    // And from a rim, far from the middle of the region.
     let mut away = scene.clone();
-    away.cameras[0].transform.translation += DVec3::new(95.0, 0.0, 95.0);
+    away.cameras[0].transform.translation += DVec3::new(0.0, 0.0, 95.0);
     for (kind, scene) in [
         (TracerKind::Bvh, &scene),
         (TracerKind::ImageSpace, &scene),
@@ -175,8 +175,8 @@ fn an_open_plane_gets_the_irradiance_of_the_upper_half() {
             let found = mean(&seen, 16, channel, |_, _| true);
             let off = found / expected - 1.0;
             println!("{name}, channel {channel}: {:+.3} %", 100.0 * off);
-            // 16 suns; parts whose colours differ lie along one direction.
-            let most = if image.is_none() { 1e-3 } else { 0.02 };
+            // 24 suns, taken for discs; parts whose colours differ lie along one direction.
+            let most = if image.is_none() { 0.012 } else { 0.03 };
             assert!(off.abs() < most, "{name}: {found}, expected {expected}");
         }
     }
@@ -214,7 +214,7 @@ fn more_suns_come_closer_to_the_path_tracer_in_a_courtyard() {
     };
     let (direct, indirect) = (reference(PathComponent::Direct), reference(PathComponent::Indirect));
     let mut errors = Vec::new();
-    for environment_suns in [4, 16, 48] {
+    for environment_suns in [4, 24, 48] {
         let settings = Settings {
             environment_suns,
             ..settings()

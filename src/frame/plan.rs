@@ -548,7 +548,7 @@ mod tests {
             ..summary()
         };
         let text = Plan::for_scene(&summary, &Settings::balanced()).to_string();
-        for name in ["ceiling lamp", "window", "irradiance is a point's"] {
+        for name in ["ceiling lamp", "window", "irradiance of bulbs and spots is a point's"] {
             assert!(text.contains(name), "{name} in\n{text}");
         }
     }

@@ -247,7 +247,7 @@ impl Settings {
             env_map_count: 12,
             env_maps_at_lights: 0,
             env_map_size: 128,
-            environment_suns: 16,
+            environment_suns: 24,
             shadow_map_size: 512,
             soft_shadow: SoftShadowSettings::default(),
             selector: EnvMapSelectorSettings::default(),
@@ -285,7 +285,7 @@ impl Settings {
             emission_importance: 0.0,
             env_map_count: 16,
             env_map_size: 256,
-            environment_suns: 32,
+            environment_suns: 48,
             shadow_map_size: 1024,
             selector: EnvMapSelectorSettings {
                 coverage_target: 1.0,

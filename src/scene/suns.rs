@@ -246,7 +246,7 @@ mod tests {
             assert!(suns.iter().all(|s| s.angle > 0.0 && s.angle < WIDEST));
         }
         // Any plane: of suns on its horizon the part above it counts.
-        for (count, most) in [(8, 0.2), (16, 0.1), (32, 0.06), (48, 0.04)] {
+        for (count, most) in [(8, 0.03), (16, 0.1), (24, 0.02), (48, 0.02)] {
             let suns = Sun::divide(None, count);
             let mut worst = 0.0f64;
             for i in 0..500 {
