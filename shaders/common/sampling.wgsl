@@ -37,6 +37,14 @@ fn sampling_disc(u: vec2f) -> vec2f {
     return r * vec2f(cos(phi), sin(phi));
 }
 
+// Uniform in the cone about +z, given 1 - cos of its half angle: pdf 1/(2 pi one_minus_cos).
+fn sampling_cone(u: vec2f, one_minus_cos: f32) -> vec3f {
+    let down = u.x * one_minus_cos;
+    let r = sqrt(max(0.0, down * (2.0 - down)));
+    let phi = 2.0 * SAMPLING_PI * u.y;
+    return vec3f(r * cos(phi), r * sin(phi), 1.0 - down);
+}
+
 // About +z in proportion to the intensity of a spot, given 1 - cos of its inner and outer half angle:
 // with v = 1 - cos(theta), f(v) = 1 up to inner and ((outer - v) / (outer - inner))^2 beyond; pdf f / (2 pi F),
 // F = inner + (outer - inner)/3.

@@ -67,10 +67,7 @@ fn light_within(light: Light, sequence_index: u32) -> Light {
         // 1 - cos of the half angle.
         let cosine = inverseSqrt(1.0 + light.extent * light.extent);
         let until = light.extent * cosine * light.extent * cosine / (1.0 + cosine);
-        let v = place.x * until;
-        let phi = 2.0 * SAMPLING_PI * place.y;
-        let r = sqrt(v * (2.0 - v));
-        let local = vec3f(r * cos(phi), r * sin(phi), 1.0 - v);
+        let local = sampling_cone(place, until);
         let axes = sampling_frame(normalize(mat3x3f(light.right, light.up, light.direction) * local));
         own.right = axes[0];
         own.up = axes[1];

@@ -96,7 +96,7 @@ fn emitter_sample_point(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
     // 1 - cos of the cone's half angle, without cancellation.
     let sine_squared = (e.extent / distance) * (e.extent / distance);
     let one_minus_cos = sine_squared / (1.0 + sqrt(1.0 - sine_squared));
-    let local = emitter_cone(u, one_minus_cos);
+    let local = sampling_cone(u, one_minus_cos);
     let direction = normalize(sampling_frame(axis) * local);
     let solid_angle = 2.0 * EMITTER_PI * one_minus_cos;
     // Up to the sphere: the nearer crossing.
@@ -104,14 +104,6 @@ fn emitter_sample_point(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
     let until = along - sqrt(max(0.0, e.extent * e.extent - squared * (1.0 - local.z * local.z)));
     let radiance = e.strength / (EMITTER_PI * e.extent * e.extent);
     return EmitterSample(radiance, e.pick / solid_angle, direction, false, p + until * direction, false);
-}
-
-// Uniform in the cone about +z of this 1 - cos.
-fn emitter_cone(u: vec2f, one_minus_cos: f32) -> vec3f {
-    let down = u.x * one_minus_cos;
-    let r = sqrt(max(0.0, down * (2.0 - down)));
-    let phi = 2.0 * EMITTER_PI * u.y;
-    return vec3f(r * cos(phi), r * sin(phi), 1.0 - down);
 }
 
 // A spot, or a disc of which every point shines like one.
@@ -139,7 +131,7 @@ fn emitter_sample_directional(index: u32, u: vec2f) -> EmitterSample {
     let half_sine = sin(0.5 * e.extent);
     let one_minus_cos = 2.0 * half_sine * half_sine;
     let sine = sin(e.extent);
-    let direction = normalize(sampling_frame(-e.u) * emitter_cone(u, one_minus_cos));
+    let direction = normalize(sampling_frame(-e.u) * sampling_cone(u, one_minus_cos));
     let solid_angle = 2.0 * EMITTER_PI * one_minus_cos;
     return EmitterSample(
         e.strength / (EMITTER_PI * sine * sine), e.pick / solid_angle, direction, true, vec3f(0.0), false,
