@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{Component, Gpu, Offline, Reference, assert_no_errors, gpu};
+use common::{Component, Gpu, Offline, Reference, assert_no_errors, disc_over_horizon, gpu};
 use lightfall::frame::{IndirectMethod, Settings, TracerKind};
 use lightfall::glam::{DVec3, Vec3};
 use lightfall::pass::FirstHits;
@@ -11,7 +11,6 @@ use lightfall::read_buffer_blocking;
 use lightfall::reference::{PathComponent, PathTracerSettings};
 use lightfall::resource::{Photon, PhotonState};
 use lightfall::scene::{Instance, Light, LightKind, Material, Mesh, Scene, samples};
-use std::f64::consts::PI;
 
 const KINDS: [TracerKind; 3] = [TracerKind::ImageSpace, TracerKind::Hybrid, TracerKind::Bvh];
 const SIZE: [u32; 2] = [48, 48];
@@ -332,19 +331,8 @@ fn photons_of_a_wide_sun_that_sets_come_from_the_part_above_the_horizon() {
             .filter(above)
             .map(|p| f64::from(p.flux[0]))
             .sum();
-        // Of a disc's directions those above the horizon, by their cosines with the plane and with the disc's middle.
-        let (mut over, mut across) = (0.0, 0.0);
-        for i in 0..500 {
-            let theta = angle * (f64::from(i) + 0.5) / 500.0;
-            for k in 0..500 {
-                let phi = 2.0 * PI * (f64::from(k) + 0.5) / 500.0;
-                let height = theta.cos() * f64::sin(elevation) + theta.sin() * phi.sin() * f64::cos(elevation);
-                over += height.max(0.0) * theta.sin();
-                across += theta.cos() * theta.sin();
-            }
-        }
         // 10 W/m² on 200 by 200 m.
-        let expected = 10.0 * 4e4 * over / across;
+        let expected = 10.0 * 4e4 * disc_over_horizon(elevation, angle);
         let off = found * unit / expected - 1.0;
         println!("elevation {elevation}: {:+.2} %", 100.0 * off);
         assert!(off.abs() < 0.01, "{elevation}: {found}, expected {expected}");

@@ -3,7 +3,7 @@
 mod common;
 
 use common::statistics::Random;
-use common::{Component, Offline, assert_no_errors, gpu, mean, offline};
+use common::{Component, Offline, assert_no_errors, disc_over_horizon, gpu, mean, offline};
 use lightfall::frame::{Settings, Upsampling};
 use lightfall::glam::{DAffine3, DVec3};
 use lightfall::pass::{Bandwidth, PhotonSplatterSettings, TraceMethod};
@@ -92,24 +92,6 @@ fn a_sun_lights_a_plane_by_its_cosine() {
     };
     let cosine = 2.0 / DVec3::new(1.0, -2.0, 0.5).length();
     direct_light_matches(&scene, 0.0005, |_| 0.5 / std::f64::consts::PI * 10.0 * cosine);
-}
-
-/// Irradiance of a plane by a disc in the sky over that across the disc: quadrature over what stands above the horizon.
-fn disc_over_horizon(elevation: f64, angle: f64) -> f64 {
-    let axis = DVec3::new(elevation.cos(), elevation.sin(), 0.0);
-    let (side, up) = (DVec3::Z, DVec3::Z.cross(axis));
-    let steps = 1000;
-    let mut sums = [0.0; 2];
-    for ring in 0..steps {
-        let theta = angle * (f64::from(ring) + 0.5) / f64::from(steps);
-        for step in 0..steps {
-            let phi = std::f64::consts::TAU * (f64::from(step) + 0.5) / f64::from(steps);
-            let toward = theta.cos() * axis + theta.sin() * (phi.cos() * side + phi.sin() * up);
-            sums[0] += toward.y.max(0.0) * theta.sin();
-            sums[1] += toward.dot(axis) * theta.sin();
-        }
-    }
-    sums[0] / sums[1]
 }
 
 #[test]

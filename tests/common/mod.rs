@@ -9,6 +9,8 @@ pub(crate) mod meshes;
 pub(crate) mod statistics;
 pub(crate) mod texture;
 
+use lightfall::glam::DVec3;
+
 pub(crate) use examples::adapter::{self, Gpu, Wishes};
 pub(crate) use examples::offline::{self, Component, Offline};
 #[cfg(all(feature = "bvh", feature = "reference"))]
@@ -44,4 +46,22 @@ pub(crate) fn mean(pixels: &[[f32; 3]], width: u32, channel: usize, keep: impl F
     let kept = (0..).zip(pixels).filter(|(i, _)| keep(i % width, i / width));
     let (sum, count) = kept.fold((0.0, 0), |(s, n), (_, p)| (s + f64::from(p[channel]), n + 1));
     sum / f64::from(count)
+}
+
+/// Irradiance of a plane by a disc in the sky over that across the disc: quadrature over what stands above the horizon.
+pub(crate) fn disc_over_horizon(elevation: f64, angle: f64) -> f64 {
+    let axis = DVec3::new(elevation.cos(), elevation.sin(), 0.0);
+    let (side, up) = (DVec3::Z, DVec3::Z.cross(axis));
+    let steps = 1000;
+    let mut sums = [0.0; 2];
+    for ring in 0..steps {
+        let theta = angle * (f64::from(ring) + 0.5) / f64::from(steps);
+        for step in 0..steps {
+            let phi = std::f64::consts::TAU * (f64::from(step) + 0.5) / f64::from(steps);
+            let toward = theta.cos() * axis + theta.sin() * (phi.cos() * side + phi.sin() * up);
+            sums[0] += toward.y.max(0.0) * theta.sin();
+            sums[1] += toward.dot(axis) * theta.sin();
+        }
+    }
+    sums[0] / sums[1]
 }
