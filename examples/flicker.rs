@@ -61,6 +61,9 @@ struct Arguments {
     /// Any field of Settings but frames and tracer.kind, repeatable; an unknown key lists them all
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+    /// What moves is told apart by every Nth frame, between which nothing may move by more than a pixel
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    still_every: u32,
     /// Part of the adapter's name or backend (default: a discrete GPU, software last)
     #[arg(long)]
     adapter: Option<String>,
@@ -85,12 +88,13 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         ..Wishes::default()
     };
     let gpu = Gpu::open(arguments.adapter.as_deref(), wishes)?;
+    let glowing = motion.with_glowing_still_parts(arguments.still_every as usize);
     let player = Player {
         gpu: &gpu,
         side: arguments.size,
-        bar: progress::bar((1 + tracers.len() as u64) * u64::from(arguments.frames)),
+        bar: progress::bar((glowing.moments.len() + tracers.len() * motion.moments.len()) as u64),
     };
-    let is_static = player.static_pixels(&motion)?;
+    let is_static = player.static_pixels(&glowing)?;
     let mut rows = Vec::new();
     for (tracer, settings) in &tracers {
         let histories = player.histories(&motion, settings)?;
@@ -249,8 +253,9 @@ impl Motion {
         moves
     }
 
-    /// The same motion without lights, in which what never moves emits a radiance of 1 W/m²/sr and all else is dark.
-    fn with_glowing_still_parts(&self) -> Self {
+    /// Every so many frames of the same motion, without lights; what never moves emits a radiance of 1 W/m²/sr and all
+    /// else is dark.
+    fn with_glowing_still_parts(&self, every: usize) -> Self {
         let own_materials = &self.first.materials;
         let emitting = |radiance: f32| {
             own_materials.iter().map(move |material| Material {
@@ -266,7 +271,7 @@ impl Motion {
             material: instance.material + if moves { own_materials.len() } else { 0 },
             ..instance.clone()
         };
-        let moments = self.moments.iter().map(|moment| Moment {
+        let moments = self.moments.iter().step_by(every).map(|moment| Moment {
             instances: moment.instances.iter().zip(&moves).map(mark).collect(),
             lights: Vec::new(),
         });
@@ -315,17 +320,17 @@ impl Player<'_> {
         self.gpu.check()
     }
 
-    /// Whether a pixel and its eight neighbours see nothing but still surfaces in all frames.
+    /// Whether a pixel and its eight neighbours see nothing but still surfaces in all frames of a motion in which only
+    /// still surfaces glow.
     ///
-    /// It is read off an image of the same motion in which still surfaces glow. Depth and colour in a G-buffer would
-    /// not do: they stay the same where an object slides along a plane of its own. Nor would direct light: it is as
-    /// black on an object that moves in the shade as on the floor there. Surfaces do not glow on their backs, so that
-    /// still ones seen from behind are left out, which only makes the region smaller; the sky is left out too. No
-    /// photon is traced for it, so that it is the same for all tracers.
+    /// Depth and colour in a G-buffer would not do: they stay the same where an object slides along a plane of its
+    /// own. Nor would direct light: it is as black on an object that moves in the shade as on the floor there. Surfaces
+    /// do not glow on their backs, so that still ones seen from behind are left out, which only makes the region
+    /// smaller; the sky is left out too. No photon is traced for it, so that it is the same for all tracers.
     ///
     /// # Errors
     /// One line if rendering fails or there is no such pixel.
-    fn static_pixels(&self, motion: &Motion) -> Result<Vec<bool>, String> {
+    fn static_pixels(&self, glowing: &Motion) -> Result<Vec<bool>, String> {
         // The tracer that asks for no places of environment maps; without lights it does not run.
         let settings = Settings {
             tracer_kind: TracerKind::Bvh,
@@ -333,16 +338,11 @@ impl Player<'_> {
         };
         let side = self.side as usize;
         let mut is_still = vec![true; side * side];
-        self.play(
-            &motion.with_glowing_still_parts(),
-            &settings,
-            Component::Direct,
-            |pixels| {
-                for (is_still, &radiance) in is_still.iter_mut().zip(pixels) {
-                    *is_still &= radiance > 0.5;
-                }
-            },
-        )?;
+        self.play(glowing, &settings, Component::Direct, |pixels| {
+            for (is_still, &radiance) in is_still.iter_mut().zip(pixels) {
+                *is_still &= radiance > 0.5;
+            }
+        })?;
         let is_static = without_border(&is_still, side);
         if is_static.contains(&true) {
             Ok(is_static)

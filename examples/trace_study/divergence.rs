@@ -11,12 +11,12 @@ use lightfall::resource::{SurfaceHit, SurfaceRay};
 /// Invocations that run together on usual GPUs.
 const GROUP: usize = 32;
 
-/// Steps of the walk: mean of all rays, and mean over groups of the longest in each, which is what a group takes.
-fn steps(hits: &[SurfaceHit]) -> [f64; 2] {
-    let mean = hits.iter().map(|h| f64::from(h.steps)).sum::<f64>() / hits.len() as f64;
+/// How much each ray took: mean of all rays, and mean over groups of the most in each, which is what a group takes.
+fn a_ray_and_a_group(hits: &[SurfaceHit], taken: impl Fn(&SurfaceHit) -> u32) -> [f64; 2] {
+    let mean = hits.iter().map(|hit| f64::from(taken(hit))).sum::<f64>() / hits.len() as f64;
     let groups = hits
         .chunks(GROUP)
-        .map(|g| g.iter().map(|h| f64::from(h.steps)).fold(0.0, f64::max));
+        .map(|group| f64::from(group.iter().map(&taken).max().unwrap_or(0)));
     [mean, groups.clone().sum::<f64>() / groups.count() as f64]
 }
 
@@ -38,8 +38,8 @@ pub(crate) fn table(
         let all = maps.maps.centers().iter().map(to).enumerate();
         all.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |n| n.0)
     };
-    println!("\nOrderedWalk, 8 maps of 256²; steps of the walk, groups of {GROUP}. µs are of this adapter.\n");
-    println!("| rays | steps a ray | steps a group takes | of its lanes busy | µs a ray | again → hybrid |");
+    println!("\nOrderedWalk, 8 maps of 256²; groups of {GROUP}. µs are of this adapter.\n");
+    println!("| rays | steps: a ray, a group | fetches: a ray, a group | lanes busy | µs a ray | again → hybrid |");
     println!("|---|---|---|---|---|---|");
     let tracer = ImageSpaceTracer::new(&bench.gpu.device, TraceMethod::OrderedWalk);
     type Order<'a> = (&'a str, &'a dyn Fn(&SurfaceRay) -> (usize, usize, usize));
@@ -82,11 +82,12 @@ pub(crate) fn table(
 }
 
 fn row(bench: &Bench<'_>, name: &str, (hits, ms): &(Vec<SurfaceHit>, f64), truths: &[Option<Truth>]) {
-    let [ray, group] = steps(hits);
+    let [steps, group_steps] = a_ray_and_a_group(hits, |hit| hit.steps);
+    let [fetches, group_fetches] = a_ray_and_a_group(hits, |hit| hit.fetches);
     let verdict = judge(truths, hits, bench.diagonal);
     println!(
-        "| {name} | {ray:.1} | {group:.1} | {:.0} % | {:.2} | {:.2} → {:.2} |",
-        100.0 * ray / group,
+        "| {name} | {steps:.1}, {group_steps:.1} | {fetches:.1}, {group_fetches:.1} | {:.0} % | {:.2} | {:.2} → {:.2} |",
+        100.0 * steps / group_steps,
         ms * 1e3 / hits.len() as f64,
         100.0 * verdict.again,
         100.0 * verdict.hybrid
