@@ -274,7 +274,7 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::BVH_TRACER, "BvhAttributes", bvh_mesh::gpu::BvhAttributes { tex_coords, triangle, order }),
         #[cfg(all(feature = "bvh", feature = "reference"))]
         twin!(wgsl::PATH_TRACER, "Params", path_tracer::gpu::Params {
-            eye, is_parallel, forward, bounces, right, roulette_from, up, component, size, emitter_count, rectangle_count,
+            eye, is_parallel, forward, bounces, right, roulette_from, up, component, size, emitter_count, crossed_count,
             pick_per_area, environment_pick, environment_norm, environment_rotation, environment_size, _pad,
         }),
         #[cfg(all(feature = "bvh", feature = "reference"))]
@@ -304,7 +304,7 @@ fn twins() -> Vec<Twin> {
             light_count, shadow_map_size, direct_weight, indirect_weight,
         }),
         twin!(wgsl::SPECULAR_PATHS_BEGIN, "SpecularPath", specular_paths::gpu::SpecularPath {
-            throughput, goes_on, radiance, _pad,
+            throughput, state, radiance, _pad,
         }),
         twin!(wgsl::PHOTON_GRID, "GridParams", photon_grid::gpu::GridParams {
             bandwidth, first_slot, slot_count, row, cells,

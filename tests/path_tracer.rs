@@ -9,7 +9,7 @@ use lightfall::reference::{PathComponent, PathEstimate, PathTracerSettings};
 use lightfall::scene::{
     Camera, EnvironmentImage, Instance, Light, LightKind, Material, Mesh, Projection, Scene, samples,
 };
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 /// The mean of `samples` paths a pixel.
 fn render(gpu: &Gpu, scene: &Scene, settings: &PathTracerSettings, size: [u32; 2], samples: u32) -> PathEstimate {
@@ -102,6 +102,26 @@ fn polygon_irradiance(p: DVec3, corners: &[DVec3]) -> f64 {
     0.5 * sum.abs()
 }
 
+/// Irradiance of a floor by a lamp of unit intensity.
+fn cosine_over_square(lamp: DVec3, p: DVec3) -> f64 {
+    let way = lamp - p;
+    way.normalize().y / way.length_squared()
+}
+
+/// Of a function of the way from the middle of a level disc; an even spread of points by rings of equal area.
+fn mean_over_disc(radius: f64, value: impl Fn(DVec3) -> f64) -> f64 {
+    let (rings, spokes) = (8, 16);
+    let points = (0..rings).flat_map(|ring| (0..spokes).map(move |spoke| (ring, spoke)));
+    let sum: f64 = points
+        .map(|(ring, spoke)| {
+            let r = radius * ((f64::from(ring) + 0.5) / f64::from(rings)).sqrt();
+            let angle = TAU * (f64::from(spoke) + 0.5 * f64::from(ring % 2)) / f64::from(spokes);
+            value(DVec3::new(r * angle.cos(), 0.0, r * angle.sin()))
+        })
+        .sum();
+    sum / f64::from(rings * spokes)
+}
+
 #[test]
 fn a_plane_is_lit_by_each_kind_of_light_as_the_formula_says() {
     let Some(gpu) = gpu() else { return };
@@ -117,16 +137,13 @@ fn a_plane_is_lit_by_each_kind_of_light_as_the_formula_says() {
     let sun = DVec3::new(0.5, -1.0, 0.25);
     let (u, v) = (DVec3::new(0.3, 0.0, 0.0), DVec3::new(0.0, 0.1, 0.25));
     let corners = [u + v, u - v, -u - v, v - u].map(|c| lamp + c);
-    let cosine_over_square = |p: DVec3| {
-        let way = lamp - p;
-        way.normalize().y / way.length_squared()
-    };
-    let falloff = |p: DVec3| {
+    let falloff = |lamp: DVec3, p: DVec3| {
         let cosine = (p - lamp).normalize().dot(DVec3::NEG_Y);
         ((cosine - outer.cos()) / (inner.cos() - outer.cos()))
             .clamp(0.0, 1.0)
             .powi(2)
     };
+    const SPOT_RADIUS: f64 = 0.2;
     type Irradiance<'a> = Box<dyn Fn(DVec3) -> f64 + 'a>;
     let cases: Vec<(&str, LightKind, Irradiance)> = vec![
         (
@@ -135,7 +152,7 @@ fn a_plane_is_lit_by_each_kind_of_light_as_the_formula_says() {
                 position: lamp,
                 radius: 0.0,
             },
-            Box::new(|p| 3.0 * cosine_over_square(p)),
+            Box::new(|p| 3.0 * cosine_over_square(lamp, p)),
         ),
         (
             // A sphere of uniform radiance is as bright as a point of its intensity, wherever it stands above the horizon.
@@ -144,7 +161,7 @@ fn a_plane_is_lit_by_each_kind_of_light_as_the_formula_says() {
                 position: lamp,
                 radius: 0.5,
             },
-            Box::new(|p| 3.0 * cosine_over_square(p)),
+            Box::new(|p| 3.0 * cosine_over_square(lamp, p)),
         ),
         (
             "spot",
@@ -155,7 +172,23 @@ fn a_plane_is_lit_by_each_kind_of_light_as_the_formula_says() {
                 outer_angle: outer,
                 radius: 0.0,
             },
-            Box::new(|p| 3.0 * falloff(p) * cosine_over_square(p)),
+            Box::new(|p| 3.0 * falloff(lamp, p) * cosine_over_square(lamp, p)),
+        ),
+        (
+            "wide spot",
+            LightKind::Spot {
+                position: lamp,
+                direction: DVec3::NEG_Y,
+                inner_angle: inner,
+                outer_angle: outer,
+                radius: SPOT_RADIUS,
+            },
+            Box::new(|p| {
+                mean_over_disc(SPOT_RADIUS, |offset| {
+                    let lamp = lamp + offset;
+                    3.0 * falloff(lamp, p) * cosine_over_square(lamp, p)
+                })
+            }),
         ),
         (
             "sun",
@@ -602,6 +635,87 @@ fn what_a_mirror_throws_onto_the_floor_is_the_caustic_and_what_it_hides_is_missi
         let error = mean(&estimate) / expected - 1.0;
         println!("mirror beside a floor, {name}: {:+.3} %", 100.0 * error);
         assert!(error.abs() < 0.005, "{name}: {error}");
+    }
+}
+
+#[test]
+fn a_mirror_throws_the_light_of_lamps_with_an_extent_as_if_they_stood_behind_it() {
+    let Some(gpu) = gpu() else { return };
+    let half_view = 0.8;
+    let depth = -0.9;
+    let lamp = DVec3::new(0.3, 1.0, -0.2);
+    let mirrored = lamp.with_z(2.0 * depth - lamp.z);
+    let sun = DVec3::new(0.3, -1.0, -0.8);
+    type Irradiance<'a> = Box<dyn Fn(DVec3) -> f64 + 'a>;
+    let cases: Vec<(&str, LightKind, Irradiance)> = vec![
+        (
+            "sphere",
+            LightKind::Point {
+                position: lamp,
+                radius: 0.4,
+            },
+            Box::new(|p| cosine_over_square(mirrored, p)),
+        ),
+        (
+            "spot",
+            LightKind::Spot {
+                position: lamp,
+                direction: DVec3::NEG_Y,
+                inner_angle: 1.5,
+                outer_angle: 1.55,
+                radius: 0.4,
+            },
+            Box::new(|p| {
+                mean_over_disc(0.4, |offset| {
+                    let falls = (p - mirrored - offset).normalize().dot(DVec3::NEG_Y);
+                    let (inner, outer) = (1.5f64.cos(), 1.55f64.cos());
+                    let falloff = ((falls - outer) / (inner - outer)).clamp(0.0, 1.0).powi(2);
+                    falloff * cosine_over_square(mirrored + offset, p)
+                })
+            }),
+        ),
+        (
+            "sun",
+            LightKind::Directional {
+                direction: sun,
+                angle: 0.4,
+            },
+            Box::new(|_| -sun.normalize().y),
+        ),
+    ];
+    for (name, kind, irradiance) in cases {
+        let mut scene = floor(2.0, 0.6, half_view);
+        let (middle, u, v) = (
+            DVec3::new(0.0, 20.0, depth),
+            DVec3::new(20.0, 0.0, 0.0),
+            DVec3::new(0.0, 20.0, 0.0),
+        );
+        scene.meshes.push(Mesh {
+            name: "mirror".into(),
+            positions: [-u - v, u - v, u + v, v - u]
+                .map(|c| (middle + c).as_vec3().to_array())
+                .to_vec(),
+            indices: vec![0, 1, 2, 0, 2, 3],
+            ..Mesh::default()
+        });
+        scene.materials.push(Material {
+            base_color: [0.8; 3],
+            metallic: 1.0,
+            roughness: 0.0,
+            ..Material::default()
+        });
+        scene.instances.push(Instance::new(1, 1));
+        scene.lights.push(Light {
+            name: name.into(),
+            kind,
+            color: [1.0; 3],
+            intensity: 1.0,
+        });
+        let expected = 0.8 * expected_mean(0.6, half_view, irradiance);
+        let estimate = render(&gpu, &scene, &component(PathComponent::Caustic, 1), [64, 64], 1024);
+        let error = mean(&estimate) / expected - 1.0;
+        println!("mirror beside a floor under a {name}: {:+.3} %", 100.0 * error);
+        assert!(error.abs() < 0.01, "{name}: {error}");
     }
 }
 

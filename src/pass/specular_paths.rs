@@ -46,7 +46,7 @@ pub(crate) mod gpu {
     #[repr(C)]
     pub(crate) struct SpecularPath {
         pub(crate) throughput: [f32; 3],
-        pub(crate) goes_on: u32,
+        pub(crate) state: u32,
         pub(crate) radiance: [f32; 3],
         pub(crate) _pad: u32,
     }

@@ -50,14 +50,14 @@ pub struct Emitters {
     environment_pick: f32,
     environment_norm: f32,
     count: u32,
-    rectangle_count: u32,
+    crossed_count: u32,
     pick_per_area: f32,
 }
 
 /// What the path tracer's uniform takes from here.
 pub(super) struct EmitterParams {
     pub(super) count: u32,
-    pub(super) rectangle_count: u32,
+    pub(super) crossed_count: u32,
     pub(super) pick_per_area: f32,
     pub(super) environment_pick: f32,
     pub(super) environment_norm: f32,
@@ -93,7 +93,7 @@ impl Emitters {
             environment_pick: pick_of(gpu::ENVIRONMENT),
             environment_norm: sky.norm,
             count: list.emitters.len() as u32,
-            rectangle_count: list.emitters.iter().filter(|e| e.kind == gpu::RECTANGLE).count() as u32,
+            crossed_count: list.crossed_count as u32,
             pick_per_area: if total > 0.0 { (PI / total) as f32 } else { 0.0 },
         })
     }
@@ -119,7 +119,7 @@ impl Emitters {
     pub(super) fn params(&self) -> EmitterParams {
         EmitterParams {
             count: self.count,
-            rectangle_count: self.rectangle_count,
+            crossed_count: self.crossed_count,
             pick_per_area: self.pick_per_area,
             environment_pick: self.environment_pick,
             environment_norm: self.environment_norm,
@@ -129,9 +129,10 @@ impl Emitters {
     }
 }
 
-/// Emitters in the unit frame with their powers, rectangles first.
+/// Emitters in the unit frame with their powers; first those without geometry that rays can run into.
 struct EmitterList {
     emitters: Vec<gpu::Emitter>,
+    crossed_count: usize,
     powers: Vec<f64>,
     environment: Option<Environment>,
 }
@@ -140,13 +141,16 @@ impl EmitterList {
     fn of(frame: &UnitFrame, scene: &Scene) -> Self {
         let mut list = Self {
             emitters: Vec::new(),
+            crossed_count: 0,
             powers: Vec::new(),
             environment: None,
         };
-        let is_rectangle = |light: &&Light| matches!(light.kind, LightKind::Rectangle { .. });
-        let rectangles = scene.lights.iter().filter(is_rectangle);
-        let others = scene.lights.iter().filter(|l| !is_rectangle(l));
-        for light in rectangles.chain(others) {
+        let (crossed, others): (Vec<_>, Vec<_>) = scene.lights.iter().partition(|light| is_crossed(light));
+        for light in crossed {
+            list.add_light(frame, scene, light);
+        }
+        list.crossed_count = list.emitters.len();
+        for light in others {
             list.add_light(frame, scene, light);
         }
         list.add_triangles(frame, scene);
@@ -287,6 +291,16 @@ impl EmitterList {
             emitter.pick_until = (so_far / total) as f32;
         }
         total
+    }
+}
+
+/// Whether rays can run into a light that is no surface and not all around: it has an extent.
+fn is_crossed(light: &Light) -> bool {
+    match light.kind {
+        LightKind::Rectangle { .. } => true,
+        LightKind::Point { radius, .. } | LightKind::Spot { radius, .. } => radius > 0.0,
+        LightKind::Directional { angle, .. } => angle > 0.0,
+        LightKind::Environment { .. } => false,
     }
 }
 

@@ -3,9 +3,9 @@
 //! Inputs: [`BvhGeometry`], [`Emitters`], a camera. Output: [`PathEstimate`], or [`Radiance`] to look at. Cost: a ray and a
 //! shadow ray a scattering; noise falls as one over the root of the number of samples. Sources: Kajiya 1986 (the rendering
 //! equation), Veach 1997 (multiple importance sampling), Walter et al. 2007 and Heitz 2018 (rough surfaces). All lights of
-//! [`LightKind`](crate::scene::LightKind) and all materials of [`Material`](crate::scene::Material) are modelled. Limits: a
-//! path never finds a point or parallel light through a smooth mirror or glass, so caustics of those are missing; instance
-//! flags are not honoured: everything blocks and reflects; interpolated normals let a few directions pass below the facet
+//! [`LightKind`](crate::scene::LightKind) and all materials of [`Material`](crate::scene::Material) are modelled. Lamps
+//! with an extent are met by paths, through mirrors and glass as well, and are not seen directly. Limits: a path never finds a
+//! light without extent through a smooth mirror or glass, so caustics of those are missing; instance flags are not honoured: everything blocks and reflects; interpolated normals let a few directions pass below the facet
 //! that they leave, as in other renderers (Veach 1997, section 5.3.4).
 
 use super::emitters::Emitters;
@@ -33,7 +33,7 @@ pub(crate) mod gpu {
         pub(crate) component: u32,
         pub(crate) size: [u32; 2],
         pub(crate) emitter_count: u32,
-        pub(crate) rectangle_count: u32,
+        pub(crate) crossed_count: u32,
         pub(crate) pick_per_area: f32,
         pub(crate) environment_pick: f32,
         pub(crate) environment_norm: f32,
@@ -380,7 +380,7 @@ fn params(resources: &PathTracerResources, inputs: &PathTracerInputs<'_>) -> gpu
         size,
         component: settings.component as u32,
         emitter_count: emitters.count,
-        rectangle_count: emitters.rectangle_count,
+        crossed_count: emitters.crossed_count,
         pick_per_area: emitters.pick_per_area,
         environment_pick: emitters.environment_pick,
         environment_norm: emitters.environment_norm,

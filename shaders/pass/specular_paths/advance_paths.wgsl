@@ -17,12 +17,58 @@
 const SPECULAR_INVERSE_PI: f32 = 0.318309886;
 // A lamp that is set into a surface stands before it, though rounding may say otherwise.
 const SPECULAR_BEFORE: f32 = 1.0 - 0x1p-12;
+// How far a ray goes that meets nothing.
+const SPECULAR_FAR: f32 = 1e30;
 
-// Radiance of the flat lamps whose fronts a ray crosses before `furthest`. They block nothing.
-fn lamps_crossed(ray: SurfaceRay, furthest: f32) -> vec3f {
+// Radiance of a round lamp, where a ray crosses it before `furthest`. Parts of the environment are seen as such.
+fn round_lamp_crossed(light: Light, ray: SurfaceRay, furthest: f32) -> vec3f {
+    let axial = -dot(light.direction, ray.direction);
+    let way = light.position - ray.position;
+    let along = dot(way, ray.direction);
+    let off = way - along * ray.direction;
+    let squared_radius = light.extent * light.extent;
+    switch light.kind {
+        case LIGHT_POINT: {
+            // A sphere of radiance I / (pi R^2); a point to who is within it.
+            let within = squared_radius - dot(off, off);
+            let is_before = along > 0.0 && dot(way, way) > squared_radius;
+            if within > 0.0 && is_before && along - sqrt(within) < furthest {
+                return light.intensity * (SPECULAR_INVERSE_PI / squared_radius);
+            }
+        }
+        case LIGHT_SPOT: {
+            // A disc of which every point shines like a spot.
+            let distance = -dot(way, light.direction) / axial;
+            let on_disc = way - distance * ray.direction;
+            let is_within = dot(on_disc, on_disc) < squared_radius;
+            if axial > 0.0 && distance > 0.0 && is_within && distance * SPECULAR_BEFORE < furthest {
+                let falls = sampling_one_minus_cos(-ray.direction, light.direction);
+                let falloff = sampling_spot_falloff(falls, light.inner, light.outer);
+                return light.intensity * (falloff * SPECULAR_INVERSE_PI / (squared_radius * axial));
+            }
+        }
+        default: {
+            // A disc in the sky.
+            let across = cross(light.direction, ray.direction);
+            let is_within = axial > 0.0 && dot(across, across) < squared_radius * axial * axial;
+            if is_within && furthest == SPECULAR_FAR && !light_is_met(light) {
+                let sine = light_disc_sine(light);
+                return light.intensity * (SPECULAR_INVERSE_PI / (sine * sine));
+            }
+        }
+    }
+    return vec3f(0.0);
+}
+
+// Radiance of the flat lamps whose fronts a ray crosses before `furthest`, and `with_round` ones of the others. They block
+// nothing.
+fn lamps_crossed(ray: SurfaceRay, furthest: f32, with_round: bool) -> vec3f {
     var sum = vec3f(0.0);
     for (var i = 0u; i < params.light_count; i++) {
         if lights[i].kind != LIGHT_AREA {
+            if with_round && lights[i].extent > 0.0 {
+                sum += round_lamp_crossed(lights[i], ray, furthest);
+            }
             continue;
         }
         // Of many triangles the rectangle that stands for them.
@@ -42,13 +88,13 @@ fn advanced(before: SpecularPath, index: u32, pixel: vec2u) -> SpecularPath {
     let ray = rays[index];
     let hit = hits[index];
     let is_hit = hit.kind == HIT_SURFACE || hit.kind == HIT_TENTATIVE;
-    let furthest = select(1e30, hit.distance, is_hit);
+    let furthest = select(SPECULAR_FAR, hit.distance, is_hit);
     let weight = select(params.indirect_weight, params.direct_weight, params.step == 0u);
-    path.radiance += weight * path.throughput * lamps_crossed(ray, furthest);
+    path.radiance += weight * path.throughput * lamps_crossed(ray, furthest, before.state == SPECULAR_MIRRORED);
     if hit.kind == HIT_ESCAPED {
         path.radiance += weight * path.throughput * environment_radiance(ray.direction);
     }
-    path.goes_on = 0u;
+    path.state = SPECULAR_ENDED;
     rays[index] = specular_no_ray();
     if !is_hit {
         return path;
@@ -71,8 +117,8 @@ fn advanced(before: SpecularPath, index: u32, pixel: vec2u) -> SpecularPath {
     }
     let scattering = scatter_sample(scatterer, -ray.direction, specular_random(pixel, params.step + 1u));
     path.throughput *= scattering.weight;
-    path.goes_on = u32(any(path.throughput > vec3f(0.0)));
-    if path.goes_on == 1u {
+    if any(path.throughput > vec3f(0.0)) {
+        path.state = specular_state(scatterer);
         rays[index] = specular_ray(p, n, scattering.direction);
     }
     return path;
@@ -86,7 +132,7 @@ fn advance_paths(@builtin(global_invocation_id) id: vec3u) {
     let index = id.y * params.width + id.x;
     let pixel = vec2u(id.x, params.first_row + id.y);
     var path = paths[index];
-    if path.goes_on == 1u {
+    if path.state != SPECULAR_ENDED {
         path = advanced(path, index, pixel);
         paths[index] = path;
     }

@@ -25,7 +25,7 @@ fn begin_paths(@builtin(global_invocation_id) id: vec3u) {
     if params.round > 0u {
         before = paths[index].radiance;
     }
-    paths[index] = SpecularPath(vec3f(0.0), 0u, before);
+    paths[index] = SpecularPath(vec3f(0.0), SPECULAR_ENDED, before);
     let bits = textureLoad(surface_texture, at, 0).r >> 16u;
     let lobe = bits & LOBE_BITS;
     if !lobe_is_specular(lobe) || (params.skips_glossy == 1u && lobe_is_glossy(lobe)) {
@@ -46,5 +46,5 @@ fn begin_paths(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     rays[index] = specular_ray(receiver.position, scatterer.frame[2], scattering.direction);
-    paths[index] = SpecularPath(scattering.weight, 1u, before);
+    paths[index] = SpecularPath(scattering.weight, specular_state(scatterer), before);
 }

@@ -22,11 +22,17 @@ struct Params {
     skips_glossy: u32,
 }
 
+// What is next for a path: nothing, or a ray from a rough surface or a smooth one. Round lamps light rough surfaces by
+// their middles and are met by rays from smooth ones.
+const SPECULAR_ENDED: u32 = 0u;
+const SPECULAR_SCATTERED: u32 = 1u;
+const SPECULAR_MIRRORED: u32 = 2u;
+
 struct SpecularPath {
     // What radiance from further on is worth at the eye
     throughput: vec3f,
-    // 0: it has ended
-    goes_on: u32,
+    // What becomes of it
+    state: u32,
     // Of all of the pixel's paths so far
     radiance: vec3f,
 }
@@ -35,6 +41,10 @@ struct SpecularPath {
 fn specular_random(pixel: vec2u, surface: u32) -> vec4f {
     let word = hash_pcg4d(vec4u(pixel, params.sample_offset, 0x5bec0000u + 64u * params.round + surface));
     return vec4f(word >> vec4u(8u)) * 0x1p-24;
+}
+
+fn specular_state(scatterer: Scatterer) -> u32 {
+    return select(SPECULAR_SCATTERED, SPECULAR_MIRRORED, scatter_is_smooth(scatterer));
 }
 
 // The ray of a path that has ended: it leaves the region at once.

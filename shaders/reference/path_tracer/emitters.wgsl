@@ -80,6 +80,21 @@ fn emitter_sample(p: vec3f, random: vec4f) -> EmitterSample {
     }
 }
 
+// 1 - cos of the half angle that a sphere of this radius fills, without cancellation.
+fn emitter_sphere_cone(radius: f32, distance: f32) -> f32 {
+    let sine_squared = (radius / distance) * (radius / distance);
+    return sine_squared / (1.0 + sqrt(1.0 - sine_squared));
+}
+
+// Density per solid angle of directions that are uniform in a cone.
+fn emitter_cone_pdf(pick: f32, one_minus_cos: f32) -> f32 {
+    return pick / (2.0 * EMITTER_PI * one_minus_cos);
+}
+
+fn emitter_sphere_radiance(e: Emitter) -> vec3f {
+    return e.strength / (EMITTER_PI * e.extent * e.extent);
+}
+
 // A point, or a sphere of radiance I / (pi R^2), from which every point outside sees a disc: uniform in its cone.
 fn emitter_sample_point(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
     let e = emitters[index];
@@ -93,17 +108,19 @@ fn emitter_sample_point(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
     if distance <= e.extent || e.extent == 0.0 {
         return EmitterSample(e.strength / squared, e.pick, axis, false, e.position, false);
     }
-    // 1 - cos of the cone's half angle, without cancellation.
-    let sine_squared = (e.extent / distance) * (e.extent / distance);
-    let one_minus_cos = sine_squared / (1.0 + sqrt(1.0 - sine_squared));
+    let one_minus_cos = emitter_sphere_cone(e.extent, distance);
     let local = sampling_cone(u, one_minus_cos);
     let direction = normalize(sampling_frame(axis) * local);
-    let solid_angle = 2.0 * EMITTER_PI * one_minus_cos;
     // Up to the sphere: the nearer crossing.
     let along = distance * local.z;
     let until = along - sqrt(max(0.0, e.extent * e.extent - squared * (1.0 - local.z * local.z)));
-    let radiance = e.strength / (EMITTER_PI * e.extent * e.extent);
-    return EmitterSample(radiance, e.pick / solid_angle, direction, false, p + until * direction, false);
+    let pdf = emitter_cone_pdf(e.pick, one_minus_cos);
+    return EmitterSample(emitter_sphere_radiance(e), pdf, direction, false, p + until * direction, true);
+}
+
+// Density per solid angle with which a flat emitter's point is sampled.
+fn emitter_flat_pdf(pick: f32, area: f32, squared: f32, cosine: f32) -> f32 {
+    return pick * squared / (area * cosine);
 }
 
 // A spot, or a disc of which every point shines like one.
@@ -118,8 +135,30 @@ fn emitter_sample_spot(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
         return emitter_dark();
     }
     let direction = way / sqrt(squared);
-    let falloff = sampling_spot_falloff(sampling_one_minus_cos(-direction, e.u), e.inner, e.outer);
-    return EmitterSample(falloff * e.strength / squared, e.pick, direction, false, position, false);
+    let intensity = emitter_spot_intensity(e, direction);
+    let cosine = -dot(e.u, direction);
+    if e.extent == 0.0 || cosine <= 0.0 {
+        return EmitterSample(intensity / squared, e.pick, direction, false, position, false);
+    }
+    let area = EMITTER_PI * e.extent * e.extent;
+    let pdf = emitter_flat_pdf(e.pick, area, squared, cosine);
+    return EmitterSample(intensity / (area * cosine), pdf, direction, false, position, true);
+}
+
+// Against the way that its light goes.
+fn emitter_spot_intensity(e: Emitter, direction: vec3f) -> vec3f {
+    return sampling_spot_falloff(sampling_one_minus_cos(-direction, e.u), e.inner, e.outer) * e.strength;
+}
+
+// 1 - cos of a sun's half angle.
+fn emitter_sun_cone(e: Emitter) -> f32 {
+    let half_sine = sin(0.5 * e.extent);
+    return 2.0 * half_sine * half_sine;
+}
+
+fn emitter_sun_radiance(e: Emitter) -> vec3f {
+    let sine = sin(e.extent);
+    return e.strength / (EMITTER_PI * sine * sine);
 }
 
 // Parallel light, or a disc in the sky of radiance E / (pi sin^2): uniform in its cone.
@@ -128,19 +167,10 @@ fn emitter_sample_directional(index: u32, u: vec2f) -> EmitterSample {
     if e.extent == 0.0 {
         return EmitterSample(e.strength, e.pick, -e.u, true, vec3f(0.0), false);
     }
-    let half_sine = sin(0.5 * e.extent);
-    let one_minus_cos = 2.0 * half_sine * half_sine;
-    let sine = sin(e.extent);
+    let one_minus_cos = emitter_sun_cone(e);
     let direction = normalize(sampling_frame(-e.u) * sampling_cone(u, one_minus_cos));
-    let solid_angle = 2.0 * EMITTER_PI * one_minus_cos;
-    return EmitterSample(
-        e.strength / (EMITTER_PI * sine * sine), e.pick / solid_angle, direction, true, vec3f(0.0), false,
-    );
-}
-
-// Density per solid angle with which a flat emitter's point is sampled.
-fn emitter_flat_pdf(pick: f32, area: f32, squared: f32, cosine: f32) -> f32 {
-    return pick * squared / (area * cosine);
+    let pdf = emitter_cone_pdf(e.pick, one_minus_cos);
+    return EmitterSample(emitter_sun_radiance(e), pdf, direction, true, vec3f(0.0), true);
 }
 
 fn emitter_sample_rectangle(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
@@ -159,18 +189,70 @@ fn emitter_sample_rectangle(index: u32, p: vec3f, u: vec2f) -> EmitterSample {
     return EmitterSample(e.strength, pdf, direction, false, bvh_offset(position, normal), true);
 }
 
-// Density with which `emitter_sample` finds the point where a ray crosses a rectangle's front, per solid angle; 0 if it
-// does not cross it before `furthest`.
-fn emitter_rectangle_pdf(index: u32, origin: vec3f, direction: vec3f, furthest: f32) -> f32 {
+// What a ray crosses.
+struct EmitterCrossed {
+    radiance: vec3f,
+    // Density with which `emitter_sample` finds the crossing, per solid angle; 0 if the ray crosses nothing
+    pdf: f32,
+}
+
+// A lamp that is neither a surface nor the environment, where a ray crosses its front before `furthest`.
+fn emitter_crossed(index: u32, origin: vec3f, direction: vec3f, furthest: f32) -> EmitterCrossed {
+    switch emitters[index].kind {
+        case EMITTER_POINT: { return emitter_crossed_sphere(index, origin, direction, furthest); }
+        case EMITTER_SPOT: { return emitter_crossed_disc(index, origin, direction, furthest); }
+        case EMITTER_DIRECTIONAL: { return emitter_crossed_sun(index, direction, furthest); }
+        default: { return emitter_crossed_rectangle(index, origin, direction, furthest); }
+    }
+}
+
+fn emitter_crossed_sphere(index: u32, origin: vec3f, direction: vec3f, furthest: f32) -> EmitterCrossed {
+    let e = emitters[index];
+    let way = e.position - origin;
+    let along = dot(way, direction);
+    let off = way - along * direction;
+    let inside = e.extent * e.extent - dot(off, off);
+    let squared = dot(way, way);
+    if along <= 0.0 || inside <= 0.0 || squared <= e.extent * e.extent || along - sqrt(inside) >= furthest {
+        return EmitterCrossed(vec3f(0.0), 0.0);
+    }
+    let pdf = emitter_cone_pdf(e.pick, emitter_sphere_cone(e.extent, sqrt(squared)));
+    return EmitterCrossed(emitter_sphere_radiance(e), pdf);
+}
+
+fn emitter_crossed_disc(index: u32, origin: vec3f, direction: vec3f, furthest: f32) -> EmitterCrossed {
+    let e = emitters[index];
+    let cosine = -dot(e.u, direction);
+    let t = dot(e.u, e.position - origin) / dot(e.u, direction);
+    let off = origin + t * direction - e.position;
+    if cosine <= 0.0 || t <= 0.0 || t * EMITTER_BEFORE >= furthest || dot(off, off) > e.extent * e.extent {
+        return EmitterCrossed(vec3f(0.0), 0.0);
+    }
+    let area = EMITTER_PI * e.extent * e.extent;
+    let radiance = emitter_spot_intensity(e, direction) / (area * cosine);
+    return EmitterCrossed(radiance, emitter_flat_pdf(e.pick, area, t * t, cosine));
+}
+
+fn emitter_crossed_sun(index: u32, direction: vec3f, furthest: f32) -> EmitterCrossed {
+    let e = emitters[index];
+    let one_minus_cos = emitter_sun_cone(e);
+    if furthest < BVH_FURTHEST || sampling_one_minus_cos(direction, -e.u) > one_minus_cos {
+        return EmitterCrossed(vec3f(0.0), 0.0);
+    }
+    return EmitterCrossed(emitter_sun_radiance(e), emitter_cone_pdf(e.pick, one_minus_cos));
+}
+
+fn emitter_crossed_rectangle(index: u32, origin: vec3f, direction: vec3f, furthest: f32) -> EmitterCrossed {
+    let nothing = EmitterCrossed(vec3f(0.0), 0.0);
     let e = emitters[index];
     let across = cross(e.u, e.v);
     let cosine = -dot(normalize(across), direction);
     if cosine <= 0.0 {
-        return 0.0;
+        return nothing;
     }
     let t = dot(across, e.position - origin) / dot(across, direction);
     if t <= 0.0 || t * EMITTER_BEFORE >= furthest {
-        return 0.0;
+        return nothing;
     }
     // Coordinates along u and v, which need not be perpendicular (Cramer).
     let at = origin + t * direction - e.position;
@@ -178,9 +260,9 @@ fn emitter_rectangle_pdf(index: u32, origin: vec3f, direction: vec3f, furthest: 
     let a = dot(cross(at, e.v), across) * scale;
     let b = dot(cross(e.u, at), across) * scale;
     if max(abs(a), abs(b)) > 1.0 {
-        return 0.0;
+        return nothing;
     }
-    return emitter_flat_pdf(e.pick, e.extent, t * t, cosine);
+    return EmitterCrossed(e.strength, emitter_flat_pdf(e.pick, e.extent, t * t, cosine));
 }
 
 fn emitter_sample_triangle(index: u32, p: vec3f, u: vec2f) -> EmitterSample {

@@ -13,8 +13,8 @@ struct Params {
     component: u32,
     size: vec2u,
     emitter_count: u32,
-    // Emitters 0 up to this are rectangles, which rays may meet
-    rectangle_count: u32,
+    // Emitters 0 up to this are lamps that rays cross
+    crossed_count: u32,
     // Probability, per area and unit radiance, with which an emissive surface is picked
     pick_per_area: f32,
     // Probability of picking the environment
@@ -94,16 +94,16 @@ fn path_found_weight(path: Path, light_pdf: f32) -> f32 {
     return select(path_heuristic(path.pdf, light_pdf), 1.0, path.pdf == 0.0);
 }
 
-// Light of rectangles that the ray crosses before `distance`; they block nothing. The eye does not see them.
-fn path_cross_rectangles(path: ptr<function, Path>, distance: f32) {
+// Light of lamps that the ray crosses before `distance`; they block nothing. The eye does not see them.
+fn path_cross_lamps(path: ptr<function, Path>, distance: f32) {
     if (*path).scatterings == 0u || !path_counts(*path, (*path).scatterings) {
         return;
     }
-    for (var i = 0u; i < params.rectangle_count; i++) {
-        let light_pdf = emitter_rectangle_pdf(i, (*path).origin, (*path).direction, distance);
-        if light_pdf > 0.0 {
-            let weight = path_found_weight(*path, light_pdf);
-            (*path).radiance += weight * (*path).throughput * emitters[i].strength;
+    for (var i = 0u; i < params.crossed_count; i++) {
+        let crossed = emitter_crossed(i, (*path).origin, (*path).direction, distance);
+        if crossed.pdf > 0.0 {
+            let weight = path_found_weight(*path, crossed.pdf);
+            (*path).radiance += weight * (*path).throughput * crossed.radiance;
         }
     }
 }
@@ -179,7 +179,7 @@ fn path_trace(pixel: vec2u, sample: u32) -> vec3f {
     var path = path_begin(pixel, path_random(&random).xy);
     loop {
         let hit = bvh_closest(path.origin, path.direction, BVH_FURTHEST, BVH_ALL);
-        path_cross_rectangles(&path, hit.distance);
+        path_cross_lamps(&path, hit.distance);
         if hit.instance == BVH_NONE {
             path_see_environment(&path);
             break;

@@ -18,10 +18,18 @@ fn corner(builder: &mut Builder, material: usize) {
     );
 }
 
+/// Radius of all lamps here, metres. A point's light behind glass could be checked with no path tracer.
+const LAMP_RADIUS: f64 = 0.08;
+
 fn bulb(position: DVec3, intensity: f32) -> Light {
     Light {
         name: "bulb".into(),
-        ..Light::point(position, intensity, [1.0, 0.93, 0.82])
+        kind: LightKind::Point {
+            position,
+            radius: LAMP_RADIUS,
+        },
+        color: [1.0, 0.93, 0.82],
+        intensity,
     }
 }
 
@@ -163,7 +171,7 @@ pub fn water(time: f64) -> Scene {
             direction: DVec3::new(0.15, -1.0, 0.1).normalize(),
             inner_angle: 20f64.to_radians(),
             outer_angle: 30f64.to_radians(),
-            radius: 0.0,
+            radius: LAMP_RADIUS,
         },
         color: [1.0, 0.97, 0.9],
         intensity: 60.0,
