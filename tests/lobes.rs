@@ -444,3 +444,54 @@ fn diffuse_and_smooth_surfaces_scatter_all_light_in_a_white_furnace() {
         }
     }
 }
+
+#[test]
+fn metal_whose_facets_scatter_more_than_once_loses_no_light() {
+    let Some(gpu) = gpu() else { return };
+    let inputs: Vec<[u32; 4]> = (0..CASES as u32)
+        .flat_map(|case| (0..SAMPLES).map(move |i| [case, i, 17, 0]))
+        .collect();
+    let list = |values: [f64; 5]| values.map(|v| format!("{v:.9}")).join(", ");
+    // A white metal and one of colour 0.5; light, and what is evaluated over the density, which must be the same.
+    let body = format!(
+        "var roughness = array<f32, 5>({}); var angles = array<f32, 5>({});
+        let a = angles[input.x % 5u];
+        let coded = LOBE_MULTIPLE + roughness[input.x / 5u];
+        let s = scatter_by(vec3f(0.0, 0.0, 1.0), true, vec3f(1.0, 0.5, 0.5), 1.0, coded, 0.0, {INDEX});
+        let o = vec3f(sin(a), 0.0, cos(a));
+        let drawn = scatter_sample(s, o, vec4f(hash_pcg4d(input) >> vec4u(8u)) * 0x1p-24);
+        let evaluated = scatter_evaluate(s, o, drawn.direction);
+        let again = select(0.0, evaluated.x / evaluated.w, drawn.weight.x > 0.0);
+        return vec4f(drawn.weight.xy, abs(again - drawn.weight.x), 0.0);",
+        list(ROUGHNESS),
+        list(DEGREES.map(f64::to_radians)),
+    );
+    let drawn = run(&gpu, &body, &inputs);
+    let mut worst = [0.0f64; 2];
+    for (case, samples) in drawn.chunks(SAMPLES as usize).enumerate() {
+        let mean = |c: usize| samples.iter().map(|s| f64::from(s[c])).sum::<f64>() / f64::from(SAMPLES);
+        let [white, half] = [mean(0), mean(1)];
+        let points = quadrature(Lobe::Metal, case);
+        let single: f64 = points
+            .iter()
+            .map(|p| p.probability * lit(p.direction, alpha(case)))
+            .sum();
+        let expected = 0.5 * single / (1.0 - 0.5 * (1.0 - single));
+        for (worst, error) in worst.iter_mut().zip([white - 1.0, half / expected - 1.0]) {
+            *worst = worst.max(error.abs());
+        }
+        let name = format!("roughness {}, {}°", ROUGHNESS[case / 5], DEGREES[case % 5]);
+        assert!((white - 1.0).abs() < 0.015, "{name}: white scatters {white}");
+        assert!(
+            (half / expected - 1.0).abs() < 0.015,
+            "{name}: {half}, expected {expected}"
+        );
+        let apart = samples.iter().map(|s| s[2]).fold(0.0, f32::max);
+        assert!(apart < 1e-3, "{name}: sampled and evaluated differ by {apart}");
+    }
+    println!(
+        "multiple scattering, 5 × 5: white off by at most {:.2} %, colour 0.5 by {:.2} %",
+        100.0 * worst[0],
+        100.0 * worst[1]
+    );
+}

@@ -330,6 +330,8 @@ fn what_a_white_surface_loses_in_a_white_furnace_is_what_its_facets_shadow() {
         ("mirror", 1.0, 0.0, 0.0, 0.999, 1.001),
         ("metal, roughness 0.1", 1.0, 0.1, 0.0, 0.985, 1.001),
         ("metal, roughness 0.5", 1.0, 0.5, 0.0, 0.9, 0.999),
+        ("metal of multiple scattering, roughness 0.5", 1.0, 0.5, 0.0, 0.99, 1.01),
+        ("metal of multiple scattering, roughness 1", 1.0, 1.0, 0.0, 0.99, 1.01),
         ("glass, roughness 0.1", 0.0, 0.1, 1.0, 0.985, 1.001),
     ];
     // Glass that hardly bends light is where facets are hardest to tell from directions.
@@ -351,6 +353,7 @@ fn what_a_white_surface_loses_in_a_white_furnace_is_what_its_facets_shadow() {
             metallic,
             roughness,
             transmission,
+            multiple_scattering: name.contains("multiple"),
             ..Material::default()
         });
         scene.lights.push(environment(None, 0.0));

@@ -644,6 +644,7 @@ impl<'a> Builder<'a> {
             metallic: pbr.metallic_factor.0,
             roughness: pbr.roughness_factor.0,
             phong_exponent: None,
+            multiple_scattering: false,
             metallic_roughness_texture: self.texture(pbr.metallic_roughness_texture.as_ref(), false)?,
             emission: source.emissive_factor.0.map(|e| e * strength),
             emission_texture: self.texture(source.emissive_texture.as_ref(), true)?,

@@ -45,3 +45,17 @@ fn ggx_upward(v: vec3f) -> vec3f {
     let length = sqrt(horizontal);
     return vec3f(-v.xy * (v.z / length), length);
 }
+
+// Share of the light from a direction of this cosine that facets which reflect all of it send on to each other: 1 minus the
+// directional albedo. A fit of ours to a quadrature, the albedo within 1 % for cosines above 0.1, within 4 % for all.
+fn ggx_loss(cosine: f32, alpha: f32) -> f32 {
+    let c = saturate(cosine);
+    let x = c / (c + 2.0 * alpha);
+    let y = sqrt(alpha);
+    let powers = y * vec4f(1.0, y, y * y, y * y * y);
+    let c0 = vec4f(0.0594, 0.1448, 0.2399, -0.0542);
+    let c1 = vec4f(8.7759, -30.6105, 37.0081, -14.0313);
+    let c2 = vec4f(-18.7803, 58.2764, -55.7854, 15.5263);
+    let c3 = vec4f(9.7538, -24.5042, 6.8186, 8.1526);
+    return clamp(dot(powers, c0 + x * (c1 + x * (c2 + x * c3))), 0.0, 0.7);
+}

@@ -29,6 +29,8 @@ struct Scatterer {
     color: vec3f,
     // Of GGX; the exponent of a Phong lobe
     alpha: f32,
+    // Whether its facets scatter light more than once
+    is_multiple: bool,
     // Index of refraction of the far side over that of the near side
     eta: f32,
 }
@@ -43,11 +45,13 @@ struct Scattering {
     squeeze: f32,
 }
 
-// Of a material by the conventions of glTF 2.0; a metal of negative roughness is a Phong lobe of that exponent. `normal` is on the side that the ray came from.
+// Of a material by the conventions of glTF 2.0, roughness as of `lobe_metal`. `normal` is on the side that the ray came from.
 fn scatter_by(
-    normal: vec3f, is_front: bool, color: vec3f, metallic: f32, roughness: f32, transmission: f32, index: f32,
+    normal: vec3f, is_front: bool, color: vec3f, metallic: f32, coded_roughness: f32, transmission: f32, index: f32,
 ) -> Scatterer {
-    let is_phong = roughness < 0.0;
+    let is_phong = coded_roughness < 0.0;
+    let is_multiple = coded_roughness >= LOBE_MULTIPLE;
+    let roughness = select(coded_roughness, coded_roughness - LOBE_MULTIPLE, is_multiple);
     let is_smooth = roughness < LOBE_SMOOTH && !is_phong;
     var kind = SCATTER_DIFFUSE;
     if transmission > SCATTER_IS_TRANSMISSIVE {
@@ -58,7 +62,7 @@ fn scatter_by(
         kind = select(select(SCATTER_METAL, SCATTER_MIRROR, is_smooth), SCATTER_PHONG, is_phong);
     }
     let alpha = select(max(roughness * roughness, SCATTER_LEAST_ALPHA), -roughness, is_phong);
-    return Scatterer(kind, sampling_frame(normal), color, alpha, select(1.0 / index, index, is_front));
+    return Scatterer(kind, sampling_frame(normal), color, alpha, is_multiple, select(1.0 / index, index, is_front));
 }
 
 // As a lobe says.
@@ -108,7 +112,7 @@ fn scatter_evaluate(s: Scatterer, outgoing: vec3f, incoming: vec3f) -> vec4f {
             }
             let h = normalize(o + i);
             let seen = ggx_seen_density(o, h, s.alpha) / (4.0 * dot(o, h));
-            return vec4f(s.color * seen * ggx_lit_share(i, s.alpha), seen);
+            return vec4f(scatter_metal_color(s, o) * seen * ggx_lit_share(i, s.alpha), seen);
         }
         case SCATTER_PHONG: {
             if i.z <= 0.0 || o.z <= 0.0 {
@@ -130,7 +134,17 @@ fn scatter_sample_metal(s: Scatterer, o: vec3f, random: vec4f) -> Scattering {
         return Scattering(vec3f(0.0, 0.0, 1.0), vec3f(0.0), 1.0, 1.0);
     }
     let pdf = ggx_seen_density(o, h, s.alpha) / (4.0 * max(dot(o, h), 1e-20));
-    return Scattering(i, s.color * ggx_lit_share(i, s.alpha), pdf, 1.0);
+    return Scattering(i, scatter_metal_color(s, o) * ggx_lit_share(i, s.alpha), pdf, 1.0);
+}
+
+// Colour of a rough metal: with what facets reflect to each other, as often as it takes, sent out as the rest is. A share E of
+// light leaves after one reflection, and of what each facet reflects on to others again E: color E / (1 - color (1 - E))
+// in all, of which a factor color E is the lobe's (Turquin 2019 with the series of Kulla and Conty 2017).
+fn scatter_metal_color(s: Scatterer, o: vec3f) -> vec3f {
+    if !s.is_multiple {
+        return s.color;
+    }
+    return s.color / (1.0 - s.color * ggx_loss(o.z, s.alpha));
 }
 
 // As dense as a power of the cosine with the mirrored direction.
