@@ -307,7 +307,12 @@ fn direct_and_indirect_light_are_all_light_pixel_by_pixel() {
 }
 
 /// Renders parts of the light and compares their energy with what the path tracer finds in so many samples.
-fn compare_energy(gpu: &Gpu, scene: &Scene, settings: &Settings, parts: [(Component, PathComponent, u32); 2]) {
+fn compare_energy<const N: usize>(
+    gpu: &Gpu,
+    scene: &Scene,
+    settings: &Settings,
+    parts: [(Component, PathComponent, u32); N],
+) {
     let name = &scene.materials.last().unwrap().name;
     for (component, path_component, samples) in parts {
         let found = means(&offline::render(gpu, scene, settings, SIZE, component).unwrap());
@@ -362,29 +367,60 @@ fn caustics_of_their_own_or_among_all_photons_are_as_bright() {
     assert_no_errors(&gpu);
 }
 
+/// Under a lamp as large as the ceiling, which paths from the eye run into soon, and whose image in a ball is larger than a pixel.
+/// Surfaces behind a ball send on light of as many bounces as those before it, the path tracer's of as many fewer as light took to
+/// the eye: in a dark room those bounces are worth nothing.
+fn light_dark_room_widely(scene: &mut Scene) {
+    let diffuse = scene.materials.len() - 1;
+    for material in &mut scene.materials[..diffuse] {
+        material.base_color = material.base_color.map(|albedo| 0.3 * albedo);
+    }
+    scene.lights[0].kind = LightKind::Rectangle {
+        center: DVec3::new(2.78, 5.4, 2.795),
+        half_u: DVec3::new(2.2, 0.0, 0.0),
+        half_v: DVec3::new(0.0, 0.0, 2.2),
+    };
+}
+
 #[test]
 fn balls_throw_and_show_as_much_light_as_the_path_tracer_finds() {
     let Some(gpu) = gpu() else { return };
     for material in [mirror(), glass(), brass()] {
         let mut scene = with_ball(material);
-        // Surfaces behind a ball send on light of as many bounces as those before it, the path tracer's of as many fewer as light
-        // took to the eye: in a dark room they are worth nothing.
-        let diffuse = scene.materials.len() - 1;
-        for material in &mut scene.materials[..diffuse] {
-            material.base_color = material.base_color.map(|albedo| 0.3 * albedo);
-        }
-        // As large as the ceiling: paths from the eye run into it soon, and no pixel is larger than its image in a ball.
-        scene.lights[0].kind = LightKind::Rectangle {
-            center: DVec3::new(2.78, 5.4, 2.795),
-            half_u: DVec3::new(2.2, 0.0, 0.0),
-            half_v: DVec3::new(0.0, 0.0, 2.2),
-        };
+        light_dark_room_widely(&mut scene);
         let parts = [
             (Component::Caustic, PathComponent::Caustic, 512),
             (Component::Specular, PathComponent::Specular, 256),
         ];
         compare_energy(&gpu, &scene, &settings(), parts);
     }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn glass_with_a_bubble_in_it_throws_as_much_light_as_the_path_tracer_finds() {
+    let Some(gpu) = gpu() else { return };
+    let mut scene = with_ball(glass());
+    light_dark_room_widely(&mut scene);
+    let ball = scene.instances.last().unwrap().clone();
+    let mut bubble = scene.meshes[ball.mesh].clone();
+    for triangle in bubble.indices.chunks_exact_mut(3) {
+        triangle.swap(1, 2);
+    }
+    bubble.normals = bubble.normals.iter().map(|n| n.map(|x| -x)).collect();
+    scene.meshes.push(bubble);
+    scene.instances.push(Instance {
+        mesh: scene.meshes.len() - 1,
+        transform: ball.transform * DAffine3::from_scale(DVec3::splat(0.6)),
+        ..ball
+    });
+    // Four surfaces of glass, then a wall.
+    compare_energy(
+        &gpu,
+        &scene,
+        &settings(),
+        [(Component::Caustic, PathComponent::Caustic, 1024)],
+    );
     assert_no_errors(&gpu);
 }
 

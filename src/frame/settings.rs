@@ -161,7 +161,7 @@ pub struct Settings {
     pub tracer_kind: TracerKind,
     /// How rays are searched for in environment maps.
     pub trace_method: TraceMethod,
-    /// How far rays are followed. `roulette_from` counts for every kind of tracer.
+    /// How far rays are followed. `roulette_from` counts for every kind of tracer; in a hybrid `most_fetches` of 0 stands for 400.
     pub tracer: ImageSpaceTracerSettings,
     /// How indirect light comes to the pixels.
     pub indirect_method: IndirectMethod,
@@ -549,7 +549,7 @@ const KNOBS: &[Knob] = &[
         .contains(&v)),
     field!(
         "tracer.most_fetches",
-        "0 or more; 0: no limit",
+        "0 or more; 0: 400 in a hybrid, else no limit",
         tracer.most_fetches,
         |_| { true }
     ),
