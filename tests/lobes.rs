@@ -431,6 +431,21 @@ fn diffuse_and_smooth_surfaces_scatter_all_light_in_a_white_furnace() {
             );
         }
         if name == "diffuse" {
+            // Its density over the hemisphere, in cos² and φ: dω = d(cos²) dφ / (2 cos).
+            let inputs: Vec<[f32; 4]> = (0..4096)
+                .map(|i| [((i / 64) as f32 + 0.5) / 64.0, ((i % 64) as f32 + 0.5) / 64.0, 0.0, 0.0])
+                .collect();
+            let body = format!(
+                "let s = scatter_by(vec3f(0.0, 0.0, 1.0), {material}, {INDEX});
+                let z = sqrt(input.x); let r = sqrt(1.0 - input.x); let phi = 6.2831853 * input.y;
+                let i = vec3f(r * cos(phi), r * sin(phi), z);
+                return scatter_evaluate(s, vec3f(0.6, 0.0, 0.8), i) * (3.14159265 / z);"
+            );
+            let evaluated = run(&gpu, &body, &inputs);
+            for channel in [0, 3] {
+                let integral: f64 = evaluated.iter().map(|e| f64::from(e[channel])).sum::<f64>() / 4096.0;
+                assert!((integral - 1.0).abs() < 1e-3, "{name}, channel {channel}: {integral}");
+            }
             // cos² and φ are uniform.
             let mut counts = vec![0.0; BINS * BINS];
             for [x, y, z, _] in &drawn {

@@ -132,6 +132,7 @@ impl Emitters {
 /// Emitters in the unit frame with their powers; first those without geometry that rays can run into.
 struct EmitterList {
     emitters: Vec<gpu::Emitter>,
+    /// How many of them those are.
     crossed_count: usize,
     powers: Vec<f64>,
     environment: Option<Environment>,

@@ -3,9 +3,10 @@
 //! Inputs: [`BvhGeometry`], [`Emitters`], a camera. Output: [`PathEstimate`], or [`Radiance`] to look at. Cost: a ray and a
 //! shadow ray a scattering; noise falls as one over the root of the number of samples. Sources: Kajiya 1986 (the rendering
 //! equation), Veach 1997 (multiple importance sampling), Walter et al. 2007 and Heitz 2018 (rough surfaces). All lights of
-//! [`LightKind`](crate::scene::LightKind) and all materials of [`Material`](crate::scene::Material) are modelled. Lamps
-//! with an extent are met by paths, through mirrors and glass as well, and are not seen directly. Limits: a path never finds a
-//! light without extent through a smooth mirror or glass, so caustics of those are missing; instance flags are not honoured: everything blocks and reflects; interpolated normals let a few directions pass below the facet
+//! [`LightKind`](crate::scene::LightKind) and all materials of [`Material`](crate::scene::Material) are modelled. Paths run into
+//! lamps with an extent, through mirrors and glass as well; the eye itself does not see them. Limits: a path never finds a light
+//! without extent through a smooth mirror or glass, so caustics of those are missing; instance flags are not honoured:
+//! everything blocks and reflects; interpolated normals let a few directions pass below the facet
 //! that they leave, as in other renderers (Veach 1997, section 5.3.4).
 
 use super::emitters::Emitters;

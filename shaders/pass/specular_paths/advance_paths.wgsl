@@ -17,11 +17,10 @@
 const SPECULAR_INVERSE_PI: f32 = 0.318309886;
 // A lamp that is set into a surface stands before it, though rounding may say otherwise.
 const SPECULAR_BEFORE: f32 = 1.0 - 0x1p-12;
-// How far a ray goes that meets nothing.
-const SPECULAR_FAR: f32 = 1e30;
 
-// Radiance of a round lamp, where a ray crosses it before `furthest`. Parts of the environment are seen as such.
-fn round_lamp_crossed(light: Light, ray: SurfaceRay, furthest: f32) -> vec3f {
+// Radiance of a point light, a spot or a sun of some extent, where a ray runs into it before `furthest`, or where it escapes.
+// Parts of the environment are seen as such.
+fn extent_crossed(light: Light, ray: SurfaceRay, furthest: f32, escapes: bool) -> vec3f {
     let axial = -dot(light.direction, ray.direction);
     let way = light.position - ray.position;
     let along = dot(way, ray.direction);
@@ -51,7 +50,7 @@ fn round_lamp_crossed(light: Light, ray: SurfaceRay, furthest: f32) -> vec3f {
             // A disc in the sky.
             let across = cross(light.direction, ray.direction);
             let is_within = axial > 0.0 && dot(across, across) < squared_radius * axial * axial;
-            if is_within && furthest == SPECULAR_FAR && !light_is_met(light) {
+            if is_within && escapes && !light_is_met(light) {
                 let sine = light_disc_sine(light);
                 return light.intensity * (SPECULAR_INVERSE_PI / (sine * sine));
             }
@@ -60,14 +59,14 @@ fn round_lamp_crossed(light: Light, ray: SurfaceRay, furthest: f32) -> vec3f {
     return vec3f(0.0);
 }
 
-// Radiance of the flat lamps whose fronts a ray crosses before `furthest`, and `with_round` ones of the others. They block
-// nothing.
-fn lamps_crossed(ray: SurfaceRay, furthest: f32, with_round: bool) -> vec3f {
+// Radiance of the lamps that a ray runs into before `furthest`: of the fronts of flat ones, and `from_smooth` surfaces, of all
+// that have an extent; those light rough surfaces by their middles. They block nothing.
+fn lamps_crossed(ray: SurfaceRay, furthest: f32, escapes: bool, from_smooth: bool) -> vec3f {
     var sum = vec3f(0.0);
     for (var i = 0u; i < params.light_count; i++) {
         if lights[i].kind != LIGHT_AREA {
-            if with_round && lights[i].extent > 0.0 {
-                sum += round_lamp_crossed(lights[i], ray, furthest);
+            if from_smooth && lights[i].extent > 0.0 {
+                sum += extent_crossed(lights[i], ray, furthest, escapes);
             }
             continue;
         }
@@ -88,9 +87,10 @@ fn advanced(before: SpecularPath, index: u32, pixel: vec2u) -> SpecularPath {
     let ray = rays[index];
     let hit = hits[index];
     let is_hit = hit.kind == HIT_SURFACE || hit.kind == HIT_TENTATIVE;
-    let furthest = select(SPECULAR_FAR, hit.distance, is_hit);
+    let furthest = select(1e30, hit.distance, is_hit);
+    let from_smooth = before.state == SPECULAR_FROM_SMOOTH;
     let weight = select(params.indirect_weight, params.direct_weight, params.step == 0u);
-    path.radiance += weight * path.throughput * lamps_crossed(ray, furthest, before.state == SPECULAR_MIRRORED);
+    path.radiance += weight * path.throughput * lamps_crossed(ray, furthest, hit.kind == HIT_ESCAPED, from_smooth);
     if hit.kind == HIT_ESCAPED {
         path.radiance += weight * path.throughput * environment_radiance(ray.direction);
     }

@@ -22,16 +22,15 @@ struct Params {
     skips_glossy: u32,
 }
 
-// What is next for a path: nothing, or a ray from a rough surface or a smooth one. Round lamps light rough surfaces by
-// their middles and are met by rays from smooth ones.
+// What is next for a path: nothing, or a ray that a rough surface scattered, or one that a mirror or smooth glass sent on.
 const SPECULAR_ENDED: u32 = 0u;
-const SPECULAR_SCATTERED: u32 = 1u;
-const SPECULAR_MIRRORED: u32 = 2u;
+const SPECULAR_FROM_ROUGH: u32 = 1u;
+const SPECULAR_FROM_SMOOTH: u32 = 2u;
 
 struct SpecularPath {
     // What radiance from further on is worth at the eye
     throughput: vec3f,
-    // What becomes of it
+    // SPECULAR_ENDED, SPECULAR_FROM_ROUGH or SPECULAR_FROM_SMOOTH
     state: u32,
     // Of all of the pixel's paths so far
     radiance: vec3f,
@@ -44,7 +43,7 @@ fn specular_random(pixel: vec2u, surface: u32) -> vec4f {
 }
 
 fn specular_state(scatterer: Scatterer) -> u32 {
-    return select(SPECULAR_SCATTERED, SPECULAR_MIRRORED, scatter_is_smooth(scatterer));
+    return select(SPECULAR_FROM_ROUGH, SPECULAR_FROM_SMOOTH, scatter_is_smooth(scatterer));
 }
 
 // The ray of a path that has ended: it leaves the region at once.
