@@ -419,7 +419,7 @@ fn glass_with_a_bubble_in_it_throws_as_much_light_as_the_path_tracer_finds() {
         &gpu,
         &scene,
         &settings(),
-        [(Component::Caustic, PathComponent::Caustic, 1024)],
+        [(Component::Caustic, PathComponent::Caustic, 512)],
     );
     assert_no_errors(&gpu);
 }
