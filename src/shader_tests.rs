@@ -15,6 +15,7 @@ use crate::resource::{
     MAX_LIGHTS, Photon, PhotonMap, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, emission_cells, environment,
     g_buffer, lights, lost_rays, marked_pixels, mesh_geometry, photon_targets, view,
 };
+use crate::scene::Material;
 use crate::wgsl;
 #[cfg(feature = "bvh")]
 use crate::{
@@ -749,6 +750,21 @@ fn light_kinds_are_the_same_on_both_sides() {
     ] {
         assert_eq!(shader.constant(name), Literal::U32(kind), "{name}");
     }
+}
+
+#[test]
+fn multiple_scattering_is_coded_the_same_on_both_sides() {
+    let shader = Shader::new("PhotonEmitter", wgsl::PHOTON_EMITTER);
+    let Literal::F32(more) = shader.constant("LOBE_MULTIPLE") else {
+        panic!("LOBE_MULTIPLE is not an f32");
+    };
+    let metal = Material {
+        metallic: 1.0,
+        roughness: 0.25,
+        multiple_scattering: true,
+        ..Material::default()
+    };
+    assert_eq!(metal.lobe_roughness(), more + 0.25);
 }
 
 #[test]
