@@ -466,20 +466,15 @@ fn metal_whose_facets_scatter_more_than_once_loses_no_light() {
     let inputs: Vec<[u32; 4]> = (0..CASES as u32)
         .flat_map(|case| (0..SAMPLES).map(move |i| [case, i, 17, 0]))
         .collect();
-    let list = |values: [f64; 5]| values.map(|v| format!("{v:.9}")).join(", ");
     // A white metal and one of colour 0.5; light, and what is evaluated over the density, which must be the same.
     let body = format!(
-        "var roughness = array<f32, 5>({}); var angles = array<f32, 5>({});
-        let a = angles[input.x % 5u];
-        let coded = LOBE_MULTIPLE + roughness[input.x / 5u];
-        let s = scatter_by(vec3f(0.0, 0.0, 1.0), true, vec3f(1.0, 0.5, 0.5), 1.0, coded, 0.0, {INDEX});
-        let o = vec3f(sin(a), 0.0, cos(a));
-        let drawn = scatter_sample(s, o, vec4f(hash_pcg4d(input) >> vec4u(8u)) * 0x1p-24);
-        let evaluated = scatter_evaluate(s, o, drawn.direction);
+        "{}
+        let multiple = scatter_by(vec3f(0.0, 0.0, 1.0), true, vec3f(1.0, 0.5, 0.5), 1.0, LOBE_MULTIPLE + r, 0.0, {INDEX});
+        let drawn = scatter_sample(multiple, o, vec4f(hash_pcg4d(input) >> vec4u(8u)) * 0x1p-24);
+        let evaluated = scatter_evaluate(multiple, o, drawn.direction);
         let again = select(0.0, evaluated.x / evaluated.w, drawn.weight.x > 0.0);
         return vec4f(drawn.weight.xy, abs(again - drawn.weight.x), 0.0);",
-        list(ROUGHNESS),
-        list(DEGREES.map(f64::to_radians)),
+        Lobe::Metal.wgsl("input.x")
     );
     let drawn = run(&gpu, &body, &inputs);
     let mut worst = [0.0f64; 2];

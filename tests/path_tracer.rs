@@ -108,7 +108,14 @@ fn cosine_over_square(lamp: DVec3, p: DVec3) -> f64 {
     way.normalize().y / way.length_squared()
 }
 
-/// Of a function of the way from the middle of a level disc; an even spread of points by rings of equal area.
+/// The same by a spot that looks straight down, of these half angles.
+fn spot_irradiance(lamp: DVec3, [inner, outer]: [f64; 2], p: DVec3) -> f64 {
+    let cosine = (p - lamp).normalize().dot(DVec3::NEG_Y);
+    let falloff = (cosine - outer.cos()) / (inner.cos() - outer.cos());
+    falloff.clamp(0.0, 1.0).powi(2) * cosine_over_square(lamp, p)
+}
+
+/// Mean, over a level disc, of a function of the way from its middle: an even spread of points by rings of equal area.
 fn mean_over_disc(radius: f64, value: impl Fn(DVec3) -> f64) -> f64 {
     let (rings, spokes) = (8, 16);
     let points = (0..rings).flat_map(|ring| (0..spokes).map(move |spoke| (ring, spoke)));
@@ -137,13 +144,7 @@ fn a_plane_is_lit_by_each_kind_of_light_as_the_formula_says() {
     let sun = DVec3::new(0.5, -1.0, 0.25);
     let (u, v) = (DVec3::new(0.3, 0.0, 0.0), DVec3::new(0.0, 0.1, 0.25));
     let corners = [u + v, u - v, -u - v, v - u].map(|c| lamp + c);
-    let falloff = |lamp: DVec3, p: DVec3| {
-        let cosine = (p - lamp).normalize().dot(DVec3::NEG_Y);
-        ((cosine - outer.cos()) / (inner.cos() - outer.cos()))
-            .clamp(0.0, 1.0)
-            .powi(2)
-    };
-    const SPOT_RADIUS: f64 = 0.2;
+    let spot_radius = 0.2;
     type Irradiance<'a> = Box<dyn Fn(DVec3) -> f64 + 'a>;
     let cases: Vec<(&str, LightKind, Irradiance)> = vec![
         (
@@ -172,7 +173,7 @@ fn a_plane_is_lit_by_each_kind_of_light_as_the_formula_says() {
                 outer_angle: outer,
                 radius: 0.0,
             },
-            Box::new(|p| 3.0 * falloff(lamp, p) * cosine_over_square(lamp, p)),
+            Box::new(|p| 3.0 * spot_irradiance(lamp, [inner, outer], p)),
         ),
         (
             "wide spot",
@@ -181,14 +182,9 @@ fn a_plane_is_lit_by_each_kind_of_light_as_the_formula_says() {
                 direction: DVec3::NEG_Y,
                 inner_angle: inner,
                 outer_angle: outer,
-                radius: SPOT_RADIUS,
+                radius: spot_radius,
             },
-            Box::new(|p| {
-                mean_over_disc(SPOT_RADIUS, |offset| {
-                    let lamp = lamp + offset;
-                    3.0 * falloff(lamp, p) * cosine_over_square(lamp, p)
-                })
-            }),
+            Box::new(|p| 3.0 * mean_over_disc(spot_radius, |offset| spot_irradiance(lamp + offset, [inner, outer], p))),
         ),
         (
             "sun",
@@ -597,17 +593,9 @@ fn doubling_all_lengths_and_powers_changes_no_bit_of_the_rescaled_image() {
     }
 }
 
-#[test]
-fn what_a_mirror_throws_onto_the_floor_is_the_caustic_and_what_it_hides_is_missing_from_the_direct_light() {
-    let Some(gpu) = gpu() else { return };
-    let half_view = 0.8;
-    let (middle, u, v) = (
-        DVec3::new(0.1, 0.6, -0.9),
-        DVec3::new(0.7, 0.0, 0.0),
-        DVec3::new(0.0, 0.5, 0.0),
-    );
-    let corners = [-u - v, u - v, u + v, v - u].map(|c| middle + c);
-    let mut scene = floor(2.0, 0.6, half_view);
+/// Adds a mirror of reflectance 0.8, in front of the side from which its corners go around against the clock, to a scene of one
+/// mesh and one material.
+fn add_mirror(scene: &mut Scene, corners: [DVec3; 4]) {
     scene.meshes.push(Mesh {
         name: "mirror".into(),
         positions: corners.map(|c| c.as_vec3().to_array()).to_vec(),
@@ -621,6 +609,20 @@ fn what_a_mirror_throws_onto_the_floor_is_the_caustic_and_what_it_hides_is_missi
         ..Material::default()
     });
     scene.instances.push(Instance::new(1, 1));
+}
+
+#[test]
+fn what_a_mirror_throws_onto_the_floor_is_the_caustic_and_what_it_hides_is_missing_from_the_direct_light() {
+    let Some(gpu) = gpu() else { return };
+    let half_view = 0.8;
+    let (middle, u, v) = (
+        DVec3::new(0.1, 0.6, -0.9),
+        DVec3::new(0.7, 0.0, 0.0),
+        DVec3::new(0.0, 0.5, 0.0),
+    );
+    let corners = [-u - v, u - v, u + v, v - u].map(|c| middle + c);
+    let mut scene = floor(2.0, 0.6, half_view);
+    add_mirror(&mut scene, corners);
     scene.lights.push(Light {
         color: [1.0; 3],
         ..environment(None, 0.0)
@@ -648,15 +650,13 @@ fn a_mirror_throws_the_light_of_lamps_with_an_extent_as_if_they_stood_behind_it(
     let depth = -0.9;
     let lamp = DVec3::new(0.3, 1.0, -0.2);
     let mirrored = lamp.with_z(2.0 * depth - lamp.z);
+    let (radius, [inner, outer]) = (0.4, [1.5, 1.55]);
     let sun = DVec3::new(0.3, -1.0, -0.8);
     type Irradiance<'a> = Box<dyn Fn(DVec3) -> f64 + 'a>;
     let cases: Vec<(&str, LightKind, Irradiance)> = vec![
         (
             "sphere",
-            LightKind::Point {
-                position: lamp,
-                radius: 0.4,
-            },
+            LightKind::Point { position: lamp, radius },
             Box::new(|p| cosine_over_square(mirrored, p)),
         ),
         (
@@ -664,18 +664,11 @@ fn a_mirror_throws_the_light_of_lamps_with_an_extent_as_if_they_stood_behind_it(
             LightKind::Spot {
                 position: lamp,
                 direction: DVec3::NEG_Y,
-                inner_angle: 1.5,
-                outer_angle: 1.55,
-                radius: 0.4,
+                inner_angle: inner,
+                outer_angle: outer,
+                radius,
             },
-            Box::new(|p| {
-                mean_over_disc(0.4, |offset| {
-                    let falls = (p - mirrored - offset).normalize().dot(DVec3::NEG_Y);
-                    let (inner, outer) = (1.5f64.cos(), 1.55f64.cos());
-                    let falloff = ((falls - outer) / (inner - outer)).clamp(0.0, 1.0).powi(2);
-                    falloff * cosine_over_square(mirrored + offset, p)
-                })
-            }),
+            Box::new(|p| mean_over_disc(radius, |offset| spot_irradiance(mirrored + offset, [inner, outer], p))),
         ),
         (
             "sun",
@@ -693,21 +686,7 @@ fn a_mirror_throws_the_light_of_lamps_with_an_extent_as_if_they_stood_behind_it(
             DVec3::new(20.0, 0.0, 0.0),
             DVec3::new(0.0, 20.0, 0.0),
         );
-        scene.meshes.push(Mesh {
-            name: "mirror".into(),
-            positions: [-u - v, u - v, u + v, v - u]
-                .map(|c| (middle + c).as_vec3().to_array())
-                .to_vec(),
-            indices: vec![0, 1, 2, 0, 2, 3],
-            ..Mesh::default()
-        });
-        scene.materials.push(Material {
-            base_color: [0.8; 3],
-            metallic: 1.0,
-            roughness: 0.0,
-            ..Material::default()
-        });
-        scene.instances.push(Instance::new(1, 1));
+        add_mirror(&mut scene, [-u - v, u - v, u + v, v - u].map(|c| middle + c));
         scene.lights.push(Light {
             name: name.into(),
             kind,

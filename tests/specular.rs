@@ -70,14 +70,19 @@ fn brass() -> Material {
     }
 }
 
+/// A lamp in the Cornell box of this half side, metres.
+fn square_under_ceiling(half: f64) -> LightKind {
+    LightKind::Rectangle {
+        center: DVec3::new(2.78, 5.4, 2.795),
+        half_u: DVec3::new(half, 0.0, 0.0),
+        half_v: DVec3::new(0.0, 0.0, half),
+    }
+}
+
 /// The Cornell box under a lamp, which paths from the eye can run into, with a ball of this material over the short block.
 fn with_ball(material: Material) -> Scene {
     let mut scene = samples::cornell(0.0);
-    scene.lights[0].kind = LightKind::Rectangle {
-        center: DVec3::new(2.78, 5.4, 2.795),
-        half_u: DVec3::new(0.45, 0.0, 0.0),
-        half_v: DVec3::new(0.0, 0.0, 0.45),
-    };
+    scene.lights[0].kind = square_under_ceiling(0.45);
     let mut ball = samples::furnace(0.0, 0.0).meshes.remove(0);
     for triangle in ball.indices.chunks_exact_mut(3) {
         triangle.swap(1, 2);
@@ -367,19 +372,15 @@ fn caustics_of_their_own_or_among_all_photons_are_as_bright() {
     assert_no_errors(&gpu);
 }
 
-/// Under a lamp as large as the ceiling, which paths from the eye run into soon, and whose image in a ball is larger than a pixel.
-/// Surfaces behind a ball send on light of as many bounces as those before it, the path tracer's of as many fewer as light took to
-/// the eye: in a dark room those bounces are worth nothing.
-fn light_dark_room_widely(scene: &mut Scene) {
-    let diffuse = scene.materials.len() - 1;
-    for material in &mut scene.materials[..diffuse] {
+/// Makes the lamp as large as the ceiling, so that paths from the eye run into it soon and its image in a ball is larger than a
+/// pixel, and the walls dark: surfaces behind a ball send on light of as many bounces as those before it, the path tracer's of
+/// as many fewer as light took to the eye, and in a dark room those bounces are worth nothing.
+fn widen_lamp_and_darken_walls(scene: &mut Scene) {
+    let ball = scene.materials.len() - 1;
+    for material in &mut scene.materials[..ball] {
         material.base_color = material.base_color.map(|albedo| 0.3 * albedo);
     }
-    scene.lights[0].kind = LightKind::Rectangle {
-        center: DVec3::new(2.78, 5.4, 2.795),
-        half_u: DVec3::new(2.2, 0.0, 0.0),
-        half_v: DVec3::new(0.0, 0.0, 2.2),
-    };
+    scene.lights[0].kind = square_under_ceiling(2.2);
 }
 
 #[test]
@@ -387,7 +388,7 @@ fn balls_throw_and_show_as_much_light_as_the_path_tracer_finds() {
     let Some(gpu) = gpu() else { return };
     for material in [mirror(), glass(), brass()] {
         let mut scene = with_ball(material);
-        light_dark_room_widely(&mut scene);
+        widen_lamp_and_darken_walls(&mut scene);
         let parts = [
             (Component::Caustic, PathComponent::Caustic, 512),
             (Component::Specular, PathComponent::Specular, 256),
@@ -401,7 +402,7 @@ fn balls_throw_and_show_as_much_light_as_the_path_tracer_finds() {
 fn glass_with_a_bubble_in_it_throws_as_much_light_as_the_path_tracer_finds() {
     let Some(gpu) = gpu() else { return };
     let mut scene = with_ball(glass());
-    light_dark_room_widely(&mut scene);
+    widen_lamp_and_darken_walls(&mut scene);
     let ball = scene.instances.last().unwrap().clone();
     let mut bubble = scene.meshes[ball.mesh].clone();
     for triangle in bubble.indices.chunks_exact_mut(3) {
