@@ -326,6 +326,7 @@ impl Walk {
             hierarchy: None,
             photons,
             shared: None,
+            led_by: None,
             sample_offset: 0,
             settings: &ImageSpaceTracerSettings::default(),
             timestamps: None,

@@ -251,7 +251,7 @@ fn twins() -> Vec<Twin> {
             distance, kind, normal, reflectance, fetches, maps, steps, lobe,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "WalkParams", photon_walk::gpu::WalkParams {
-            photon_count, first_hop, last_hop, roulette_from, sample_offset, row, is_shared, map,
+            photon_count, first_hop, last_hop, roulette_from, sample_offset, row, is_shared, map, is_led,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER_LIST, "LostRays", lost_rays::gpu::LostRays { workgroups, count, paths }),
         #[cfg(feature = "bvh")]
@@ -363,6 +363,7 @@ fn twins() -> Vec<Twin> {
             balls, ranges, ball_count, _pad,
         }),
         twin!(wgsl::PHOTON_EMITTER, "EmissionTable", emission_cells::gpu::EmissionTable { columns, rows }),
+        twin!(wgsl::IMAGE_SPACE_TRACER, "ReflectionTable", emission_cells::gpu::ReflectionTable { columns, rows }),
         twin!(wgsl::TRACE_STATISTICS, "Params", trace_statistics::gpu::Params { photon_count }),
         twin!(wgsl::TRACE_STATISTICS, "Sums", trace_statistics::gpu::Sums { stored, tentative, absorbed, escaped, lost }),
     ]

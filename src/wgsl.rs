@@ -74,7 +74,10 @@ pub(crate) const EMISSION_IMPORTANCE_COUNT: &str = compose![
     "pass/emission_importance/count_visible.wgsl",
     "pass/emission_importance/params.wgsl",
     "common/emission_grid.wgsl",
+    "common/reflection_cells.wgsl",
+    "common/sampling.wgsl",
     "common/photon.wgsl",
+    "common/lobe.wgsl",
     "common/g_buffer.wgsl",
     "common/octahedral.wgsl",
 ];
@@ -84,6 +87,8 @@ pub(crate) const EMISSION_IMPORTANCE_UPDATE: &str = compose![
     "pass/emission_importance/params.wgsl",
     "common/emission_cells.wgsl",
     "common/emission_grid.wgsl",
+    "common/reflection_cells.wgsl",
+    "common/sampling.wgsl",
 ];
 
 pub(crate) const DEPTH_HIERARCHY_BUILD_MEASURE: &str = compose![
@@ -126,6 +131,8 @@ pub(crate) const IMAGE_SPACE_TRACER: &str = compose![
     "pass/image_space_tracer/ordered.wgsl",
     "pass/photon_walk/walk_photons.wgsl",
     "pass/photon_walk/params.wgsl",
+    "common/emission_grid.wgsl",
+    "common/reflection_cells.wgsl",
     "common/depth_range.wgsl",
     "common/env_map.wgsl",
     "common/hit.wgsl",
@@ -159,6 +166,8 @@ pub(crate) const BVH_TRACER: &str = compose![
     "pass/bvh_tracer/bindings.wgsl",
     "pass/photon_walk/walk_photons.wgsl",
     "pass/photon_walk/params.wgsl",
+    "common/emission_grid.wgsl",
+    "common/reflection_cells.wgsl",
     "common/bvh.wgsl",
     "common/bvh_surface.wgsl",
     "common/hit.wgsl",

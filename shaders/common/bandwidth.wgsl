@@ -22,7 +22,7 @@ const BANDWIDTH_BIN: u32 = 2u;
 
 // Where more photons start than elsewhere, the rule that goes by density narrows their kernels.
 fn bandwidth_narrowing(b: Bandwidth, photon: Photon) -> f32 {
-    return select(1.0, inverseSqrt(photon_boost(photon.state)), b.rule == BANDWIDTH_DENSITY);
+    return select(1.0, pow(photon_boost(photon.state), -1.0 / 6.0), b.rule == BANDWIDTH_DENSITY);
 }
 
 // Radius of a photon's kernel, unit frame (Yao et al. 2010, section 6, made dimensionless by area and pdf); by BANDWIDTH_BIN that

@@ -30,6 +30,12 @@ fn sampling_cosine(u: vec2f) -> vec3f {
     return vec3f(r * cos(phi), r * sin(phi), sqrt(1.0 - u.x));
 }
 
+// The numbers that make a direction of it.
+fn sampling_cosine_inverse(direction: vec3f) -> vec2f {
+    let turn = atan2(direction.y, direction.x) / (2.0 * SAMPLING_PI);
+    return vec2f(1.0 - direction.z * direction.z, turn - floor(turn));
+}
+
 // Uniform on the unit disc: pdf 1/pi.
 fn sampling_disc(u: vec2f) -> vec2f {
     let r = sqrt(u.x);

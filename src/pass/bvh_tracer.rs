@@ -10,7 +10,7 @@ use super::dispatch_64;
 use super::photon_walk::{PhotonWalk, PhotonWalkInputs, PhotonWalkResources, SharedHop};
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::bvh_geometry::BVH_SLOTS;
-use crate::resource::{BvhGeometry, Photons, Rays, SurfaceRays};
+use crate::resource::{BvhGeometry, EmissionCells, Photons, Rays, SurfaceRays};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -94,6 +94,10 @@ pub struct BvhTracerInputs<'a> {
     pub photons: &'a Photons,
     /// `None`: the whole walk. A hop: this one, of the paths that the other tracer has listed.
     pub shared: Option<SharedHop<'a>>,
+    /// Which reflections more paths take from their first hit: the cells that they were emitted by ([`PhotonSpread::Cells`]).
+    ///
+    /// [`PhotonSpread::Cells`]: super::PhotonSpread::Cells
+    pub led_by: Option<&'a EmissionCells>,
     /// As for the emitter.
     pub sample_offset: u32,
     /// Scatterings before Russian roulette may end a path. Lower is faster and noisier.
@@ -200,6 +204,7 @@ impl BvhTracer {
             shared: inputs.shared,
             sample_offset: inputs.sample_offset,
             roulette_from: inputs.roulette_from,
+            led_by: inputs.led_by,
         };
         let Some(walk) = self.photon_walk.prepare(&mut resources.walk, &walk) else {
             return;

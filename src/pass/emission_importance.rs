@@ -29,16 +29,26 @@ pub(crate) mod gpu {
 }
 
 /// Bindings of `shaders/pass/emission_importance/count_visible.wgsl`, in order.
-pub(crate) const COUNT_SLOTS: [Slot; 5] = [
+pub(crate) const COUNT_SLOTS: [Slot; 6] = [
     Slot::Uniform,
     Slot::Storage,
     Slot::StorageMut,
     Slot::Uniform,
     Slot::Texture,
+    Slot::StorageMut,
 ];
 
 /// Bindings of `shaders/pass/emission_importance/update_tables.wgsl`, in order.
-pub(crate) const UPDATE_SLOTS: [Slot; 4] = [Slot::Uniform, Slot::StorageMut, Slot::StorageMut, Slot::StorageMut];
+pub(crate) const UPDATE_SLOTS: [Slot; 5] = [
+    Slot::Uniform,
+    Slot::StorageMut,
+    Slot::StorageMut,
+    Slot::StorageMut,
+    Slot::StorageMut,
+];
+
+/// Tiles along each axis of a view. Twin of `TILES` in `count_visible.wgsl`.
+pub(crate) const TILES: u64 = 32;
 
 /// Part of what was counted in earlier frames that an update keeps: what a table says changes over a few frames.
 const KEPT: f32 = 0.75;
@@ -52,6 +62,7 @@ pub struct EmissionImportance {
     device: wgpu::Device,
     count_layout: wgpu::BindGroupLayout,
     update_layout: wgpu::BindGroupLayout,
+    count_tiles: wgpu::ComputePipeline,
     count: wgpu::ComputePipeline,
     update: wgpu::ComputePipeline,
 }
@@ -60,6 +71,7 @@ pub struct EmissionImportance {
 #[derive(Debug)]
 pub struct EmissionImportanceResources {
     count: Step,
+    tiles: wgpu::Buffer,
     update: Step,
 }
 
@@ -121,6 +133,12 @@ impl EmissionImportance {
         };
         Self {
             device: device.clone(),
+            count_tiles: pipeline(
+                "lightfall::EmissionImportance::count_tiles",
+                wgsl::EMISSION_IMPORTANCE_COUNT,
+                "count_tiles",
+                &count_layout,
+            ),
             count: pipeline(
                 "lightfall::EmissionImportance::count",
                 wgsl::EMISSION_IMPORTANCE_COUNT,
@@ -164,16 +182,20 @@ impl EmissionImportance {
             inputs.cells.counts().into(),
             inputs.g_buffer.view_buffer().into(),
             (&inputs.g_buffer.views().depth).into(),
+            (&resources.tiles).into(),
         ];
         let label = "lightfall::EmissionImportance::count";
         let group = resources
             .count
             .groups
             .get(&self.device, label, &self.count_layout, &bound);
+        encoder.clear_buffer(&resources.tiles, 0, None);
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
-        pass.set_pipeline(&self.count);
         pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups(groups[0], groups[1], 1);
+        for pipeline in [&self.count_tiles, &self.count] {
+            pass.set_pipeline(pipeline);
+            pass.dispatch_workgroups(groups[0], groups[1], 1);
+        }
     }
 
     /// Records the update of the tables by what views have counted since the last one, before the emission.
@@ -203,6 +225,7 @@ impl EmissionImportance {
             inputs.cells.counts().into(),
             inputs.cells.history().into(),
             inputs.cells.tables().into(),
+            inputs.cells.reflection_tables().into(),
         ];
         let label = "lightfall::EmissionImportance::update";
         let group = resources
@@ -230,12 +253,18 @@ impl EmissionImportanceResources {
         };
         Ok(Self {
             count: step()?,
+            tiles: device::buffer(
+                device,
+                "lightfall::EmissionImportance::tiles",
+                4 * TILES * TILES,
+                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            )?,
             update: step()?,
         })
     }
 
     /// Bytes allocated.
     pub fn memory_use(&self) -> u64 {
-        self.count.params.size() + self.update.params.size()
+        self.count.params.size() + self.tiles.size() + self.update.params.size()
     }
 }

@@ -10,7 +10,7 @@
 use super::dispatch_64;
 use super::photon_walk::{PhotonWalk, PhotonWalkInputs, PhotonWalkResources, PreparedWalk, SharedHop};
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
-use crate::resource::{DepthHierarchy, EnvMaps, LostRays, Photons, RANGE_FORMAT, SurfaceRays};
+use crate::resource::{DepthHierarchy, EmissionCells, EnvMaps, LostRays, Photons, RANGE_FORMAT, SurfaceRays};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -167,6 +167,10 @@ pub struct ImageSpaceTracerInputs<'a> {
     pub photons: &'a Photons,
     /// `None`: the whole walk. A hop: this one, whose lost rays are listed.
     pub shared: Option<SharedHop<'a>>,
+    /// Which reflections more paths take from their first hit: the cells that they were emitted by ([`PhotonSpread::Cells`]).
+    ///
+    /// [`PhotonSpread::Cells`]: super::PhotonSpread::Cells
+    pub led_by: Option<&'a EmissionCells>,
     /// As for the emitter.
     pub sample_offset: u32,
     /// How to trace.
@@ -270,6 +274,7 @@ impl ImageSpaceTracer {
             shared: inputs.shared,
             sample_offset: inputs.sample_offset,
             roulette_from: inputs.settings.roulette_from,
+            led_by: inputs.led_by,
         };
         let maps = self.maps_group(
             resources,

@@ -51,6 +51,16 @@ pub enum PhotonSpread<'a> {
     Targets(&'a PhotonTargets),
 }
 
+impl<'a> PhotonSpread<'a> {
+    /// What leads the walk as well.
+    pub(crate) fn cells(self) -> Option<&'a EmissionCells> {
+        match self {
+            Self::Cells(cells) => Some(cells),
+            Self::Even | Self::Targets(_) => None,
+        }
+    }
+}
+
 /// How photons of lights that are not flat find where they first land.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum FirstHits {

@@ -3,7 +3,7 @@
 use super::dispatch_64;
 use crate::Error;
 use crate::gpu::{self as device, BindGroupCache, Slot};
-use crate::resource::{LostRays, Photons};
+use crate::resource::{EmissionCells, LostRays, Photons};
 
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
@@ -20,11 +20,12 @@ pub(crate) mod gpu {
         pub(crate) row: u32,
         pub(crate) is_shared: u32,
         pub(crate) map: u32,
+        pub(crate) is_led: u32,
     }
 }
 
 /// Bindings of group 0 of `shaders/pass/photon_walk/walk_photons.wgsl`, in order.
-pub(crate) const SLOTS: [Slot; 2] = [Slot::Uniform, Slot::StorageMut];
+pub(crate) const SLOTS: [Slot; 3] = [Slot::Uniform, Slot::StorageMut, Slot::Storage];
 
 /// One hop of a walk that two tracers share. The first walks it for all paths and lists those that it lost; the second
 /// walks it again for these. Then comes the next hop.
@@ -50,6 +51,8 @@ pub(super) struct PhotonWalk {
 pub(super) struct PhotonWalkResources {
     /// Of the whole walk, then of each shared hop from 0 on: all hops of a frame are in one submission.
     params: Vec<wgpu::Buffer>,
+    /// Bound where no tables lead the walk.
+    no_tables: wgpu::Buffer,
     groups: BindGroupCache,
 }
 
@@ -61,6 +64,7 @@ pub(super) struct PhotonWalkInputs<'a> {
     pub(super) shared: Option<SharedHop<'a>>,
     pub(super) sample_offset: u32,
     pub(super) roulette_from: u32,
+    pub(super) led_by: Option<&'a EmissionCells>,
 }
 
 /// The uniform of a walk, written, and group 0.
@@ -104,9 +108,13 @@ impl PhotonWalk {
             row,
             is_shared: u32::from(inputs.shared.is_some()),
             map: inputs.photons.map() as u32,
+            is_led: u32::from(inputs.led_by.is_some()),
         };
         inputs.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&params));
-        let bound = [buffer.into(), inputs.photons.buffer().into()];
+        let tables = inputs
+            .led_by
+            .map_or(&resources.no_tables, EmissionCells::reflection_tables);
+        let bound = [buffer.into(), inputs.photons.buffer().into(), tables.into()];
         Some(PreparedWalk {
             params: buffer.clone(),
             group: resources.groups.get(&self.device, self.label, &self.layout, &bound),
@@ -125,10 +133,11 @@ impl PhotonWalkResources {
         Ok(Self {
             groups: BindGroupCache::for_uses(params.len()),
             params,
+            no_tables: EmissionCells::no_reflection_tables(device, label)?,
         })
     }
 
     pub(super) fn memory_use(&self) -> u64 {
-        self.params.iter().map(wgpu::Buffer::size).sum()
+        self.params.iter().map(wgpu::Buffer::size).sum::<u64>() + self.no_tables.size()
     }
 }

@@ -6,8 +6,14 @@ use crate::{Error, gpu as device};
 /// Cells along each axis of a light's emission. Twin of `EMISSION_CELLS`.
 pub(crate) const CELLS: usize = 16;
 
+/// Cells along each axis of what paths of one of those go on to from their first hit. Twin of `REFLECTION_CELLS`.
+pub(crate) const REFLECTIONS: usize = 4;
+
+/// Of all lights.
+const TABLES: usize = MAX_LIGHTS * CELLS * CELLS;
+
 pub(crate) mod gpu {
-    use super::CELLS;
+    use super::{CELLS, REFLECTIONS};
     use bytemuck::{Pod, Zeroable};
 
     /// Twin of `EmissionTable` in `shaders/common/emission_cells.wgsl`.
@@ -17,6 +23,14 @@ pub(crate) mod gpu {
         pub(crate) columns: [f32; CELLS],
         pub(crate) rows: [f32; CELLS * CELLS],
     }
+
+    /// Twin of `ReflectionTable` in `shaders/common/reflection_cells.wgsl`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct ReflectionTable {
+        pub(crate) columns: [f32; REFLECTIONS],
+        pub(crate) rows: [f32; REFLECTIONS * REFLECTIONS],
+    }
 }
 
 /// For each of [`MAX_LIGHTS`] lights a table of 16 × 16 cells of the two random numbers that an emission is made of, with the
@@ -24,6 +38,7 @@ pub(crate) mod gpu {
 #[derive(Debug)]
 pub struct EmissionCells {
     tables: wgpu::Buffer,
+    reflection_tables: wgpu::Buffer,
     counts: wgpu::Buffer,
     history: wgpu::Buffer,
 }
@@ -35,21 +50,34 @@ impl EmissionCells {
     /// [`Error::LimitExceeded`] if the device grants next to nothing.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Self, Error> {
         use wgpu::BufferUsages as U;
-        let end = |i: usize| (i % CELLS + 1) as f32 / CELLS as f32;
+        fn end<const N: usize>(i: usize) -> f32 {
+            (i % N + 1) as f32 / N as f32
+        }
         let even = gpu::EmissionTable {
-            columns: std::array::from_fn(end),
-            rows: std::array::from_fn(end),
+            columns: std::array::from_fn(end::<CELLS>),
+            rows: std::array::from_fn(end::<CELLS>),
+        };
+        let even_reflections = gpu::ReflectionTable {
+            columns: std::array::from_fn(end::<REFLECTIONS>),
+            rows: std::array::from_fn(end::<REFLECTIONS>),
         };
         let buffer = |label, bytes: usize, usage| device::buffer(device, label, bytes as u64, U::STORAGE | usage);
-        let cells = 8 * MAX_LIGHTS * CELLS * CELLS;
+        let cells = 4 * TABLES * (2 + REFLECTIONS * REFLECTIONS);
         let tables = buffer(
             "lightfall::EmissionCells::tables",
             MAX_LIGHTS * size_of::<gpu::EmissionTable>(),
             U::COPY_DST | U::COPY_SRC,
         )?;
         queue.write_buffer(&tables, 0, bytemuck::cast_slice(&[even; MAX_LIGHTS]));
+        let reflection_tables = buffer(
+            "lightfall::EmissionCells::reflection_tables",
+            TABLES * size_of::<gpu::ReflectionTable>(),
+            U::COPY_DST | U::COPY_SRC,
+        )?;
+        queue.write_buffer(&reflection_tables, 0, bytemuck::cast_slice(&vec![even_reflections; TABLES]));
         Ok(Self {
             tables,
+            reflection_tables,
             counts: buffer("lightfall::EmissionCells::counts", cells, U::empty())?,
             history: buffer("lightfall::EmissionCells::history", cells, U::empty())?,
         })
@@ -61,7 +89,20 @@ impl EmissionCells {
         &self.tables
     }
 
-    /// For each cell, two `u32`: paths that started in it and hops of theirs that were seen, since the last update.
+    /// For each cell of each light, `f32`: the same for 4 × 4 cells of the two random numbers that a path's direction from its
+    /// first hit is made of, if that is diffuse.
+    pub fn reflection_tables(&self) -> &wgpu::Buffer {
+        &self.reflection_tables
+    }
+
+    /// What is bound in the place of those where there are none.
+    pub(crate) fn no_reflection_tables(device: &wgpu::Device, label: &'static str) -> Result<wgpu::Buffer, Error> {
+        let bytes = size_of::<gpu::ReflectionTable>() as u64;
+        device::buffer(device, label, bytes, wgpu::BufferUsages::STORAGE)
+    }
+
+    /// For each cell, `u32`, since the last update: weight of the hops of its paths that were seen, how many those were, and the
+    /// weight of those that came by each of its reflections.
     pub(crate) fn counts(&self) -> &wgpu::Buffer {
         &self.counts
     }
@@ -73,6 +114,6 @@ impl EmissionCells {
 
     /// Bytes allocated.
     pub fn memory_use(&self) -> u64 {
-        self.tables.size() + self.counts.size() + self.history.size()
+        self.tables.size() + self.reflection_tables.size() + self.counts.size() + self.history.size()
     }
 }

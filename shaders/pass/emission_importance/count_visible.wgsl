@@ -1,45 +1,88 @@
-// Counts, for each emission cell of each light, the paths that started there and the hops of theirs that arrived where the
-// eye sees.
+// Weighs the hops that arrive where the eye sees by how much of their part of the image they stand for: first the photons of each
+// tile of the view are counted, then each hop brings its share of its tile to the cells that its path came by.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> photons: array<Photon>;
 @group(0) @binding(2) var<storage, read_write> counts: array<atomic<u32>>;
 @group(0) @binding(3) var<uniform> view: View;
 @group(0) @binding(4) var depth_texture: texture_2d<f32>;
+@group(0) @binding(5) var<storage, read_write> tiles: array<atomic<u32>, TILE_TOTAL>;
 
+// Tiles along each axis of the view. Twin of `TILES`.
+const TILES: u32 = 32u;
+const TILE_TOTAL: u32 = TILES * TILES;
+const NO_TILE: u32 = TILE_TOTAL;
+// What a photon counts in its tile that started as densely as if all were spread evenly.
+const EVEN_PHOTON: f32 = 64.0;
+// What all hops of a tile bring together.
+const TILE_WEIGHT: f32 = 0x1p18;
 // A photon is seen if it lies no further from what its pixel shows than this share of the distance to the eye.
 const TOLERANCE: f32 = 0.02;
 
-fn is_seen(p: vec3f) -> bool {
-    let clip = view.view_projection * vec4f(p, 1.0);
+// The tile that a hop is seen in.
+fn tile_of(photon: Photon) -> u32 {
+    if !photon_is_splatted(photon.state) {
+        return NO_TILE;
+    }
+    let clip = view.view_projection * vec4f(photon.position, 1.0);
     let ndc = clip.xyz / clip.w;
     if clip.w <= 0.0 || any(abs(ndc.xy) >= vec2f(1.0)) {
-        return false;
+        return NO_TILE;
     }
-    let pixel = vec2u((vec2f(0.5, -0.5) * ndc.xy + 0.5) * vec2f(view.size));
-    let at = min(pixel, view.size - 1u);
+    let place = vec2f(0.5, -0.5) * ndc.xy + 0.5;
+    let at = min(vec2u(place * vec2f(view.size)), view.size - 1u);
     let depth = textureLoad(depth_texture, view.origin + at, 0).x;
     let surface = g_buffer_position(view, vec2f(at), depth);
-    return distance(surface, p) <= TOLERANCE * abs(clip.w);
+    if distance(surface, photon.position) > TOLERANCE * abs(clip.w) {
+        return NO_TILE;
+    }
+    let tile = min(vec2u(place * f32(TILES)), vec2u(TILES - 1u));
+    return tile.y * TILES + tile.x;
+}
+
+// In how many parts of EVEN_PHOTON it counts: as many as it has flux.
+fn photon_count(photon: Photon) -> u32 {
+    return u32(max(1.0, round(EVEN_PHOTON / photon_boost(photon.state))));
+}
+
+fn slot_of(id: vec3u) -> u32 {
+    return select(id.y * params.row + id.x, params.slot_count, id.x >= params.row);
+}
+
+@compute @workgroup_size(64)
+fn count_tiles(@builtin(global_invocation_id) id: vec3u) {
+    let slot = slot_of(id);
+    if slot >= params.slot_count {
+        return;
+    }
+    let photon = photons[slot];
+    let tile = tile_of(photon);
+    if tile != NO_TILE {
+        atomicAdd(&tiles[tile], photon_count(photon));
+    }
 }
 
 @compute @workgroup_size(64)
 fn count_visible(@builtin(global_invocation_id) id: vec3u) {
-    let slot = id.y * params.row + id.x;
-    if id.x >= params.row || slot >= params.slot_count {
+    let slot = slot_of(id);
+    if slot >= params.slot_count {
         return;
     }
     let photon = photons[slot];
     let light = photon_light(photon.light_and_surface);
-    if light >= params.light_count {
+    let tile = tile_of(photon);
+    if tile == NO_TILE || light >= params.light_count {
         return;
     }
-    let cell = 2u * (light * EMISSION_CELL_TOTAL + photon_cell(photon.state));
-    if slot < params.path_count {
-        if (photon.state & PHOTON_STATE_MASK) != PHOTON_EMPTY {
-            atomicAdd(&counts[cell], 1u);
-        }
-    } else if photon_is_splatted(photon.state) && is_seen(photon.position) {
-        atomicAdd(&counts[cell + 1u], 1u);
+    let weight = u32(TILE_WEIGHT * f32(photon_count(photon)) / f32(atomicLoad(&tiles[tile])));
+    let cell = CELL_COUNTS * (light * EMISSION_CELL_TOTAL + photon_cell(photon.state));
+    atomicAdd(&counts[cell], weight);
+    atomicAdd(&counts[cell + 1u], 1u);
+    // Hop 0 is never splatted: the path has a hop 1.
+    let path = slot % params.path_count;
+    let first_hit = photons[path];
+    if !lobe_is_specular(photon_lobe(first_hit.state, first_hit.light_and_surface)) {
+        let direction = octahedral_unpack(photons[path + params.path_count].direction);
+        atomicAdd(&counts[cell + 2u + reflection_cell(octahedral_unpack(first_hit.normal), direction)], weight);
     }
 }

@@ -1,4 +1,4 @@
-// The uniform of both steps.
+// The uniform of all steps, and how their counts lie.
 
 struct Params {
     // Paths of the photons, and slots of all their hops
@@ -12,3 +12,7 @@ struct Params {
     // Of what was counted before, the part that is kept
     kept: f32,
 }
+
+// Numbers for each emission cell: the weight of the hops of its paths that were seen, how many those were; and for each of the
+// reflections by which paths go on from a diffuse first hit, the weight of those that came that way.
+const CELL_COUNTS: u32 = 2u + REFLECTION_CELL_TOTAL;

@@ -1,28 +1,32 @@
-// Makes the tables of emission cells from what was counted: a workgroup for each light, an invocation for each cell.
+// Makes the tables of emission cells and of reflections from what was counted: a workgroup for each light, an invocation for each
+// emission cell.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read_write> counts: array<u32>;
-// Of each cell: paths that started there and hops of theirs that were seen, over the frames
-@group(0) @binding(2) var<storage, read_write> history: array<vec2f>;
+// The same over the frames
+@group(0) @binding(2) var<storage, read_write> history: array<f32>;
 @group(0) @binding(3) var<storage, read_write> emission_tables: array<EmissionTable>;
+@group(0) @binding(4) var<storage, read_write> reflection_tables: array<ReflectionTable>;
 
-// Until so many hops of a cell's paths were seen, it counts as much like the mean of all cells: what few hops say is chance.
+// Each cell has so many hops beside those that were seen, of the mean weight: what few hops say is chance.
 const SEEN_BY_CHANCE: f32 = 4.0;
 
 var<workgroup> shares: array<f32, EMISSION_CELL_TOTAL>;
 var<workgroup> sums: array<vec2f, EMISSION_CELL_TOTAL>;
 var<workgroup> columns: array<f32, EMISSION_CELLS>;
 
-// The error of a mean of samples is least where these are taken in proportion to the root of the mean square of their values:
-// here of the hops that are seen of a path, one or none.
+// A cell's share is the mean over the tiles of the view of its part in what they show. Where there are as many photons in one
+// tile as in another, all are as certain.
 @compute @workgroup_size(EMISSION_CELL_TOTAL)
 fn update_tables(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) cell: u32) {
     let light = group.x;
-    let at = light * EMISSION_CELL_TOTAL + cell;
-    let counted = params.kept * history[at] + vec2f(f32(counts[2u * at]), f32(counts[2u * at + 1u]));
-    history[at] = counted;
-    counts[2u * at] = 0u;
-    counts[2u * at + 1u] = 0u;
+    let table = light * EMISSION_CELL_TOTAL + cell;
+    let at = table * CELL_COUNTS;
+    for (var i = at; i < at + CELL_COUNTS; i++) {
+        history[i] = params.kept * history[i] + f32(counts[i]);
+        counts[i] = 0u;
+    }
+    let counted = vec2f(history[at], history[at + 1u]);
     sums[cell] = counted;
     workgroupBarrier();
     for (var half = EMISSION_CELL_TOTAL / 2u; half > 0u; half /= 2u) {
@@ -31,10 +35,7 @@ fn update_tables(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_
         }
         workgroupBarrier();
     }
-    // Paths of which so many hops are seen, were all cells alike.
-    let paths_by_chance = SEEN_BY_CHANCE * sums[0].x / max(sums[0].y, 1.0);
-    let is_any_seen = f32(sums[0].y > 0.0);
-    shares[cell] = is_any_seen * sqrt((counted.y + SEEN_BY_CHANCE) / max(counted.x + paths_by_chance, 1.0));
+    shares[cell] = counted.x + SEEN_BY_CHANCE * sums[0].x / max(sums[0].y, 1.0);
     workgroupBarrier();
     let column = cell / EMISSION_CELLS;
     let row = cell % EMISSION_CELLS;
@@ -59,11 +60,41 @@ fn update_tables(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_
         sum += scale * shares[column * EMISSION_CELLS + i] + even / f32(EMISSION_CELLS);
     }
     emission_tables[light].rows[cell] = sum / (scale * columns[column] + even);
+    // Of the cell's paths those are led on that start there because they are led.
+    let led = scale * shares[cell];
+    write_reflections(table, counted, led / (led + even / f32(EMISSION_CELLS)));
     if row == 0u {
         var end = 0.0;
         for (var i = 0u; i <= column; i++) {
             end += scale * columns[i] + even;
         }
         emission_tables[light].columns[column] = end;
+    }
+}
+
+// The table of an emission cell's reflections, of whose paths so much was counted: `led` of them in proportion to their weights, the
+// others evenly.
+fn write_reflections(table: u32, counted: vec2f, led: f32) {
+    let first = table * CELL_COUNTS + 2u;
+    let by_chance = SEEN_BY_CHANCE * max(counted.x, 1.0) / max(counted.y, 1.0);
+    var total = 0.0;
+    for (var i = 0u; i < REFLECTION_CELL_TOTAL; i++) {
+        total += history[first + i] + by_chance;
+    }
+    let scale = led / total;
+    let even = (1.0 - led) / f32(REFLECTION_CELL_TOTAL) + scale * by_chance;
+    var end = 0.0;
+    for (var column = 0u; column < REFLECTION_CELLS; column++) {
+        let own = column * REFLECTION_CELLS;
+        let before = end;
+        for (var row = 0u; row < REFLECTION_CELLS; row++) {
+            end += scale * history[first + own + row] + even;
+            // Not yet a part of the column's share.
+            reflection_tables[table].rows[own + row] = end - before;
+        }
+        reflection_tables[table].columns[column] = end;
+        for (var row = 0u; row < REFLECTION_CELLS; row++) {
+            reflection_tables[table].rows[own + row] /= end - before;
+        }
     }
 }
