@@ -10,6 +10,7 @@
 use super::dispatch_64;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::{EmissionCells, GBuffer, Lights, Photons};
+use crate::resource::emission_cells::TABLES;
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -65,6 +66,7 @@ pub struct EmissionImportance {
     count_tiles: wgpu::ComputePipeline,
     count: wgpu::ComputePipeline,
     update: wgpu::ComputePipeline,
+    update_reflections: wgpu::ComputePipeline,
 }
 
 /// Uniforms and bind groups, of a view or of the update.
@@ -144,6 +146,12 @@ impl EmissionImportance {
                 wgsl::EMISSION_IMPORTANCE_COUNT,
                 "count_visible",
                 &count_layout,
+            ),
+            update_reflections: pipeline(
+                "lightfall::EmissionImportance::update_reflections",
+                wgsl::EMISSION_IMPORTANCE_UPDATE,
+                "update_reflections",
+                &update_layout,
             ),
             update: pipeline(
                 "lightfall::EmissionImportance::update",
@@ -236,6 +244,8 @@ impl EmissionImportance {
         pass.set_pipeline(&self.update);
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(inputs.lights.count(), 1, 1);
+        pass.set_pipeline(&self.update_reflections);
+        pass.dispatch_workgroups((TABLES as u32).div_ceil(64), 1, 1);
     }
 }
 

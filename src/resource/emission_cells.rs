@@ -10,7 +10,8 @@ pub(crate) const CELLS: usize = 16;
 pub(crate) const REFLECTIONS: usize = 4;
 
 /// Of all lights.
-const TABLES: usize = MAX_LIGHTS * CELLS * CELLS;
+pub(crate) const TABLES: usize = 6 * PLACES * PLACES * PLACES;
+const PLACES: usize = 16;
 
 pub(crate) mod gpu {
     use super::{CELLS, REFLECTIONS};
@@ -62,7 +63,7 @@ impl EmissionCells {
             rows: std::array::from_fn(end::<REFLECTIONS>),
         };
         let buffer = |label, bytes: usize, usage| device::buffer(device, label, bytes as u64, U::STORAGE | usage);
-        let cells = 4 * TABLES * (2 + REFLECTIONS * REFLECTIONS);
+        let cells = 8 * MAX_LIGHTS * CELLS * CELLS + 4 * TABLES * (1 + REFLECTIONS * REFLECTIONS);
         let tables = buffer(
             "lightfall::EmissionCells::tables",
             MAX_LIGHTS * size_of::<gpu::EmissionTable>(),

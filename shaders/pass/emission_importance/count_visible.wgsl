@@ -78,11 +78,14 @@ fn count_visible(@builtin(global_invocation_id) id: vec3u) {
     let cell = CELL_COUNTS * (light * EMISSION_CELL_TOTAL + photon_cell(photon.state));
     atomicAdd(&counts[cell], weight);
     atomicAdd(&counts[cell + 1u], 1u);
-    // Hop 0 is never splatted: the path has a hop 1.
-    let path = slot % params.path_count;
-    let first_hit = photons[path];
-    if !lobe_is_specular(photon_lobe(first_hit.state, first_hit.light_and_surface)) {
-        let direction = octahedral_unpack(photons[path + params.path_count].direction);
-        atomicAdd(&counts[cell + 2u + reflection_cell(octahedral_unpack(first_hit.normal), direction)], weight);
+    for (var before = slot % params.path_count; before < slot; before += params.path_count) {
+        let hop = photons[before];
+        if !lobe_is_specular(photon_lobe(hop.state, hop.light_and_surface)) {
+            let normal = octahedral_unpack(hop.normal);
+            let direction = octahedral_unpack(photons[before + params.path_count].direction);
+            let table = REFLECTION_COUNTS_FROM + REFLECTION_COUNTS * reflection_table(hop.position, normal);
+            atomicAdd(&counts[table], 1u);
+            atomicAdd(&counts[table + 1u + reflection_cell(normal, direction)], weight);
+        }
     }
 }

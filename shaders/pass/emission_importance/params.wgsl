@@ -13,6 +13,9 @@ struct Params {
     kept: f32,
 }
 
-// Numbers for each emission cell: the weight of the hops of its paths that were seen, how many those were; and for each of the
-// reflections by which paths go on from a diffuse first hit, the weight of those that came that way.
-const CELL_COUNTS: u32 = 2u + REFLECTION_CELL_TOTAL;
+// Numbers for each emission cell: the weight of the hops of its paths that were seen, and how many those were.
+const CELL_COUNTS: u32 = 2u;
+// Behind them, for each table of reflections: how many hops of paths that went on there were seen, and for each way the weight
+// of those that came by it.
+const REFLECTION_COUNTS: u32 = 1u + REFLECTION_CELL_TOTAL;
+const REFLECTION_COUNTS_FROM: u32 = CELL_COUNTS * EMISSION_CELL_TOTAL * 64u;

@@ -60,9 +60,6 @@ fn update_tables(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_
         sum += scale * shares[column * EMISSION_CELLS + i] + even / f32(EMISSION_CELLS);
     }
     emission_tables[light].rows[cell] = sum / (scale * columns[column] + even);
-    // Of the cell's paths those are led on that start there because they are led.
-    let led = scale * shares[cell];
-    write_reflections(table, counted, led / (led + even / f32(EMISSION_CELLS)));
     if row == 0u {
         var end = 0.0;
         for (var i = 0u; i <= column; i++) {
@@ -72,23 +69,29 @@ fn update_tables(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_
     }
 }
 
-// The table of an emission cell's reflections, of whose paths so much was counted: `led` of them in proportion to their weights, the
-// others evenly.
-fn write_reflections(table: u32, counted: vec2f, led: f32) {
-    let first = table * CELL_COUNTS + 2u;
-    let by_chance = SEEN_BY_CHANCE * max(counted.x, 1.0) / max(counted.y, 1.0);
-    var total = 0.0;
-    for (var i = 0u; i < REFLECTION_CELL_TOTAL; i++) {
-        total += history[first + i] + by_chance;
+// The tables of reflections, an invocation for each.
+@compute @workgroup_size(64)
+fn update_reflections(@builtin(global_invocation_id) id: vec3u) {
+    let table = id.x;
+    if table >= REFLECTION_TABLE_TOTAL {
+        return;
     }
-    let scale = led / total;
-    let even = (1.0 - led) / f32(REFLECTION_CELL_TOTAL) + scale * by_chance;
+    let at = REFLECTION_COUNTS_FROM + table * REFLECTION_COUNTS;
+    var weight = 0.0;
+    for (var i = at; i < at + REFLECTION_COUNTS; i++) {
+        history[i] = params.kept * history[i] + f32(counts[i]);
+        counts[i] = 0u;
+        weight += select(history[i], 0.0, i == at);
+    }
+    let by_chance = SEEN_BY_CHANCE * max(weight, 1.0) / max(history[at], 1.0);
+    let scale = params.share / (weight + by_chance * f32(REFLECTION_CELL_TOTAL));
+    let even = (1.0 - params.share) / f32(REFLECTION_CELL_TOTAL) + scale * by_chance;
     var end = 0.0;
     for (var column = 0u; column < REFLECTION_CELLS; column++) {
         let own = column * REFLECTION_CELLS;
         let before = end;
         for (var row = 0u; row < REFLECTION_CELLS; row++) {
-            end += scale * history[first + own + row] + even;
+            end += scale * history[at + 1u + own + row] + even;
             // Not yet a part of the column's share.
             reflection_tables[table].rows[own + row] = end - before;
         }

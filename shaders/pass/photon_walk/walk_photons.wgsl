@@ -107,10 +107,9 @@ fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) ->
     let normal = octahedral_unpack(photon.normal);
     var reflection = Reflection(random_pair(sequence_index, 2u * bounce), 1.0);
     var origin = photon;
-    if walk.is_led == 1u && bounce == 1u {
-        let cell = photon_cell(photon.state);
-        reflection = led_reflection(photon_light(photon.light_and_surface) * EMISSION_CELL_TOTAL + cell, reflection.u);
-        let emission = photon_emission(cell, photon_boost(photon.state) * reflection.boost);
+    if walk.is_led == 1u {
+        reflection = led_reflection(reflection_table(photon.position, normal), reflection.u);
+        let emission = photon_emission(photon_cell(photon.state), photon_boost(photon.state) * reflection.boost);
         origin.state = (photon.state & ~PHOTON_EMISSION) | emission;
     }
     let local = sampling_cosine(reflection.u);
