@@ -326,7 +326,7 @@ impl Walk {
             hierarchy: None,
             photons,
             shared: None,
-            led_by: None,
+            guiding: None,
             sample_offset: 0,
             settings: &ImageSpaceTracerSettings::default(),
             timestamps: None,

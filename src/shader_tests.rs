@@ -4,16 +4,15 @@
 use crate::gpu::Slot;
 use crate::pass::photon_splatter::{raster, tiled};
 use crate::pass::{
-    accumulator, composite, depth_hierarchy_build, direct_light, emission_importance, env_map_lighting,
-    env_map_selector, final_gather, glossy_light, image_space_tracer, irradiance_filter, nearest_occluder,
-    photon_emitter, photon_grid, photon_splatter, photon_walk, soft_shadow, specular_paths, stable_sort, tone_map,
-    trace_statistics, upsampler,
+    accumulator, composite, depth_hierarchy_build, direct_light, env_map_lighting, env_map_selector, final_gather,
+    glossy_light, image_space_tracer, irradiance_filter, nearest_occluder, photon_emitter, photon_grid, photon_guiding,
+    photon_splatter, photon_walk, soft_shadow, specular_paths, stable_sort, tone_map, trace_statistics, upsampler,
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
 use crate::resource::{
-    MAX_LIGHTS, Photon, PhotonMap, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, emission_cells, environment,
-    g_buffer, lights, lost_rays, marked_pixels, mesh_geometry, photon_targets, view,
+    MAX_LIGHTS, Photon, PhotonMap, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, environment, g_buffer,
+    guiding_tables, lights, lost_rays, marked_pixels, mesh_geometry, photon_targets, view,
 };
 use crate::scene::Material;
 use crate::wgsl;
@@ -251,7 +250,7 @@ fn twins() -> Vec<Twin> {
             distance, kind, normal, reflectance, fetches, maps, steps, lobe,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "WalkParams", photon_walk::gpu::WalkParams {
-            photon_count, first_hop, last_hop, roulette_from, sample_offset, row, is_shared, map, is_led,
+            photon_count, first_hop, last_hop, roulette_from, sample_offset, row, is_shared, map, is_guided,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER_LIST, "LostRays", lost_rays::gpu::LostRays { workgroups, count, paths }),
         #[cfg(feature = "bvh")]
@@ -356,14 +355,14 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::ENV_MAP_SELECTOR, "Selection", env_map_selector::gpu::SelectionRecord {
             tag, selected, newest, is_done, is_stable, swaps, coverage, total, chosen,
         }),
-        twin!(wgsl::EMISSION_IMPORTANCE_COUNT, "Params", emission_importance::gpu::Params {
+        twin!(wgsl::PHOTON_GUIDING_COUNT, "Params", photon_guiding::gpu::Params {
             path_count, slot_count, light_count, row, share, kept,
         }),
         twin!(wgsl::PHOTON_EMITTER_AT_TARGETS, "PhotonTargets", photon_targets::gpu::PhotonTargets {
             balls, ranges, ball_count, _pad,
         }),
-        twin!(wgsl::PHOTON_EMITTER, "EmissionTable", emission_cells::gpu::EmissionTable { columns, rows }),
-        twin!(wgsl::IMAGE_SPACE_TRACER, "ReflectionTable", emission_cells::gpu::ReflectionTable { columns, rows }),
+        twin!(wgsl::PHOTON_EMITTER, "EmissionTable", guiding_tables::gpu::EmissionTable { columns, rows }),
+        twin!(wgsl::IMAGE_SPACE_TRACER, "ReflectionTable", guiding_tables::gpu::ReflectionTable { columns, rows }),
         twin!(wgsl::TRACE_STATISTICS, "Params", trace_statistics::gpu::Params { photon_count }),
         twin!(wgsl::TRACE_STATISTICS, "Sums", trace_statistics::gpu::Sums { stored, tentative, absorbed, escaped, lost }),
     ]
@@ -469,8 +468,8 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "BvhTracer" => vec![&photon_walk::SLOTS, &bvh_geometry::BVH_SLOTS, &bvh_tracer::LOST_SLOTS],
         #[cfg(feature = "bvh")]
         "BvhTracer rays" | "BvhTracer surface rays" => vec![&bvh_tracer::RAY_SLOTS, &bvh_geometry::BVH_SLOTS],
-        "EmissionImportance count" => vec![&emission_importance::COUNT_SLOTS],
-        "EmissionImportance update" => vec![&emission_importance::UPDATE_SLOTS],
+        "PhotonGuiding count" => vec![&photon_guiding::COUNT_SLOTS],
+        "PhotonGuiding emission" | "PhotonGuiding reflections" => vec![&photon_guiding::UPDATE_SLOTS],
         "PhotonSplatter receivers" => vec![&photon_splatter::RECEIVER_SLOTS],
         "PhotonSplatter tiled" => vec![&tiled::TILED_SLOTS],
         "StableSort" => vec![&stable_sort::SORT_SLOTS],
@@ -724,10 +723,16 @@ fn photon_states_are_the_same_on_both_sides() {
     assert_eq!(shader.constant("PHOTON_TENTATIVE"), Literal::U32(Photon::TENTATIVE));
     assert_eq!(shader.constant("PHOTON_BOOST_ONE"), Literal::F32(Photon::BOOST_ONE));
     assert_eq!(shader.constant("PHOTON_BOOST_STEPS"), Literal::F32(Photon::BOOST_STEPS));
-    assert_eq!(
-        shader.constant("EMISSION_CELLS"),
-        Literal::U32(emission_cells::CELLS as u32)
-    );
+    let counts = Shader::new("PhotonGuiding count", wgsl::PHOTON_GUIDING_COUNT);
+    for (name, own) in [
+        ("EMISSION_CELLS", guiding_tables::CELLS),
+        ("EMISSION_COUNTS", guiding_tables::EMISSION_COUNTS),
+        ("REFLECTION_CELLS", guiding_tables::REFLECTIONS),
+        ("REFLECTION_PLACES", guiding_tables::PLACES),
+        ("TILES", photon_guiding::TILES as usize),
+    ] {
+        assert_eq!(counts.constant(name), Literal::U32(own as u32), "{name}");
+    }
     let Literal::U32(mask) = shader.constant("PHOTON_STATE_MASK") else {
         panic!("PHOTON_STATE_MASK is not a u32");
     };

@@ -34,7 +34,7 @@ pub(crate) const MESH_GEOMETRY: &str = compose![
 pub(crate) const PHOTON_EMITTER: &str = compose![
     "pass/photon_emitter/emit_photons.wgsl",
     "pass/photon_emitter/first_hit.wgsl",
-    "common/emission_cells.wgsl",
+    "common/emission_tables.wgsl",
     "common/emission_grid.wgsl",
     "common/light.wgsl",
     "common/polygon.wgsl",
@@ -70,11 +70,11 @@ pub(crate) const PHOTON_EMITTER_AT_TARGETS: &str = compose![
     "common/hit.wgsl",
 ];
 
-pub(crate) const EMISSION_IMPORTANCE_COUNT: &str = compose![
-    "pass/emission_importance/count_visible.wgsl",
-    "pass/emission_importance/params.wgsl",
+pub(crate) const PHOTON_GUIDING_COUNT: &str = compose![
+    "pass/photon_guiding/count_visible.wgsl",
+    "pass/photon_guiding/params.wgsl",
     "common/emission_grid.wgsl",
-    "common/reflection_cells.wgsl",
+    "common/reflection_tables.wgsl",
     "common/sampling.wgsl",
     "common/photon.wgsl",
     "common/lobe.wgsl",
@@ -82,12 +82,19 @@ pub(crate) const EMISSION_IMPORTANCE_COUNT: &str = compose![
     "common/octahedral.wgsl",
 ];
 
-pub(crate) const EMISSION_IMPORTANCE_UPDATE: &str = compose![
-    "pass/emission_importance/update_tables.wgsl",
-    "pass/emission_importance/params.wgsl",
-    "common/emission_cells.wgsl",
+pub(crate) const PHOTON_GUIDING_EMISSION: &str = compose![
+    "pass/photon_guiding/update_emission.wgsl",
+    "pass/photon_guiding/params.wgsl",
+    "common/emission_tables.wgsl",
     "common/emission_grid.wgsl",
-    "common/reflection_cells.wgsl",
+    "common/reflection_tables.wgsl",
+    "common/sampling.wgsl",
+];
+
+pub(crate) const PHOTON_GUIDING_REFLECTIONS: &str = compose![
+    "pass/photon_guiding/update_reflections.wgsl",
+    "pass/photon_guiding/params.wgsl",
+    "common/reflection_tables.wgsl",
     "common/sampling.wgsl",
 ];
 
@@ -131,8 +138,8 @@ pub(crate) const IMAGE_SPACE_TRACER: &str = compose![
     "pass/image_space_tracer/ordered.wgsl",
     "pass/photon_walk/walk_photons.wgsl",
     "pass/photon_walk/params.wgsl",
-    "common/emission_grid.wgsl",
-    "common/reflection_cells.wgsl",
+    "common/reflection_tables.wgsl",
+    "common/reflection_start.wgsl",
     "common/depth_range.wgsl",
     "common/env_map.wgsl",
     "common/hit.wgsl",
@@ -166,8 +173,8 @@ pub(crate) const BVH_TRACER: &str = compose![
     "pass/bvh_tracer/bindings.wgsl",
     "pass/photon_walk/walk_photons.wgsl",
     "pass/photon_walk/params.wgsl",
-    "common/emission_grid.wgsl",
-    "common/reflection_cells.wgsl",
+    "common/reflection_tables.wgsl",
+    "common/reflection_start.wgsl",
     "common/bvh.wgsl",
     "common/bvh_surface.wgsl",
     "common/hit.wgsl",
@@ -676,8 +683,9 @@ pub const MODULES: &[(&str, &str)] = &[
     ("MeshGeometry", MESH_GEOMETRY),
     ("PhotonEmitter", PHOTON_EMITTER),
     ("PhotonEmitter::at_targets", PHOTON_EMITTER_AT_TARGETS),
-    ("EmissionImportance count", EMISSION_IMPORTANCE_COUNT),
-    ("EmissionImportance update", EMISSION_IMPORTANCE_UPDATE),
+    ("PhotonGuiding count", PHOTON_GUIDING_COUNT),
+    ("PhotonGuiding emission", PHOTON_GUIDING_EMISSION),
+    ("PhotonGuiding reflections", PHOTON_GUIDING_REFLECTIONS),
     ("DepthHierarchyBuild measure", DEPTH_HIERARCHY_BUILD_MEASURE),
     ("DepthHierarchyBuild join", DEPTH_HIERARCHY_BUILD_JOIN),
     ("ImageSpaceTracer", IMAGE_SPACE_TRACER),

@@ -172,7 +172,7 @@ fn make_and_record_every_pass(device: &wgpu::Device, queue: &wgpu::Queue, names:
         settings.indirect_method = indirect_method;
         settings.final_gather.rays = 16;
         settings.final_gather.filter_radius = index as u32 % 2;
-        settings.emission_importance = 0.5 * (index % 2) as f32;
+        settings.guided_photons = 0.5 * (index % 2) as f32;
         // The furnished ones, which take longest, once.
         let most = if index == 0 { names.len() } else { names.len().min(7) };
         for name in &names[..most] {
@@ -247,7 +247,7 @@ fn walk_by_hand(
         hierarchy,
         photons,
         shared: None,
-        led_by: None,
+        guiding: None,
         sample_offset: 0,
         settings: &settings.tracer,
         timestamps: None,
@@ -257,7 +257,7 @@ fn walk_by_hand(
         geometry,
         photons,
         shared: None,
-        led_by: None,
+        guiding: None,
         sample_offset: 0,
         roulette_from: settings.tracer.roulette_from,
         timestamps: None,
@@ -513,7 +513,7 @@ fn nothing_is_created_after_the_first_frame_and_memory_use_is_what_was_created()
                 filter_radius: 1,
                 ..Default::default()
             },
-            emission_importance: 0.5,
+            guided_photons: 0.5,
             ..small()
         });
     }

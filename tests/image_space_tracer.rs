@@ -15,7 +15,7 @@ use bench::{Bench, Maps};
 use common::meshes::room;
 use common::statistics::Random;
 use common::{Gpu, assert_no_errors, gpu};
-use judge::{Verdict, judge, unpack};
+use judge::{Verdict, judge};
 use lightfall::Error;
 use lightfall::frame::{GiRenderer, Settings};
 use lightfall::glam::{DAffine3, DVec3, Vec3};
@@ -23,7 +23,7 @@ use lightfall::pass::{
     ImageSpaceTracer, ImageSpaceTracerRayInputs, ImageSpaceTracerResources, ImageSpaceTracerSettings, TraceMethod,
 };
 use lightfall::resource::cube_face::CUBE_FACES;
-use lightfall::resource::{EnvMaps, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, SurfaceRays};
+use lightfall::resource::{EnvMaps, Photon, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, SurfaceRays};
 use lightfall::scene::{SceneSummary, samples};
 
 /// Methods that say whether they are certain.
@@ -355,7 +355,7 @@ fn normals_of_hits_face_the_ray() {
             assert!(is_hit || hit.distance == 0.0, "{method:?}: {hit:?}");
             // The paper's test does not ask.
             if is_hit && method != TraceMethod::Paper {
-                let cosine = unpack(hit.normal).dot(Vec3::from(ray.direction));
+                let cosine = Photon::unpack_unit_vector(hit.normal).dot(Vec3::from(ray.direction));
                 // A plane seen edge-on is kept within what its neighbours show, and may be met a little from behind.
                 assert!(cosine < 0.01, "{method:?}: {cosine} {hit:?}");
             }

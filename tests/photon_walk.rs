@@ -87,7 +87,7 @@ impl<'a> World<'a> {
             hierarchy: Some(&hierarchy),
             photons,
             shared,
-            led_by: None,
+            guiding: None,
             sample_offset: SAMPLE_OFFSET,
             settings: &Default::default(),
             timestamps: None,
@@ -108,7 +108,7 @@ impl<'a> World<'a> {
             geometry: &self.bvh,
             photons,
             shared,
-            led_by: None,
+            guiding: None,
             sample_offset: SAMPLE_OFFSET,
             roulette_from: ImageSpaceTracerSettings::default().roulette_from,
             timestamps: None,
@@ -384,15 +384,6 @@ fn offset(position: Vec3, normal: Vec3) -> Vec3 {
     position + 64.0 * ulp * normal
 }
 
-/// As `octahedral_unpack`.
-fn unpack(bits: u32) -> Vec3 {
-    let [x, y] = [bits, bits >> 16].map(|b| (f32::from(b as u16 as i16) / 32767.0).max(-1.0));
-    let z = 1.0 - x.abs() - y.abs();
-    let fold = |a: f32, b: f32| (1.0 - b.abs()) * if a >= 0.0 { 1.0 } else { -1.0 };
-    let [x, y] = if z >= 0.0 { [x, y] } else { [fold(x, y), fold(y, x)] };
-    Vec3::new(x, y, z).normalize()
-}
-
 #[test]
 fn photons_land_where_rays_do_on_the_side_that_they_come_to() {
     let Some(gpu) = gpu() else { return };
@@ -411,15 +402,15 @@ fn photons_land_where_rays_do_on_the_side_that_they_come_to() {
                 continue;
             }
             assert!(!to.is_unresolved());
-            let origin = offset(Vec3::from(from.position), unpack(from.normal));
+            let origin = offset(Vec3::from(from.position), Photon::unpack_unit_vector(from.normal));
             let stored = to.state() == PhotonState::Stored;
-            let travelled = unpack(to.direction);
+            let travelled = Photon::unpack_unit_vector(to.direction);
             let way = Vec3::from(to.position) - origin;
             if stored {
                 // Packed directions are good to 2.5 / 65534 of the octahedron, which comes within 1/√3 of its middle.
                 assert!((way.normalize() - travelled).length() < 1e-4 + 1e-6 / way.length());
                 assert!(
-                    unpack(to.normal).dot(travelled) < 1e-4,
+                    Photon::unpack_unit_vector(to.normal).dot(travelled) < 1e-4,
                     "it faces where the ray came from"
                 );
                 assert!(to.density.is_finite() && to.density >= 0.0);

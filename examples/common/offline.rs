@@ -95,7 +95,7 @@ impl<'a> Offline<'a> {
             composite,
         };
         // Where photons start depends on what was seen of those before: a frame in motion has others before it.
-        if settings.emission_importance > 0.0 && offline.in_motion {
+        if settings.guided_photons > 0.0 && offline.in_motion {
             for _ in 0..WARM_UP {
                 offline.render_frame(None)?;
             }

@@ -1,7 +1,7 @@
 //! What is right: the hits of environment maps against those of triangles.
 
 use lightfall::glam::Vec3;
-use lightfall::resource::{SurfaceHit, SurfaceHitKind};
+use lightfall::resource::{Photon, SurfaceHit, SurfaceHitKind};
 
 /// What a ray truly meets.
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +53,7 @@ pub(crate) fn judge(truths: &[Option<Truth>], hits: &[SurfaceHit], diagonal: f32
         let is_right = match truth {
             Some(truth) => {
                 meeting += 1.0;
-                let [near, same] = agrees(truth, hit.distance, unpack(hit.normal), diagonal);
+                let [near, same] = agrees(truth, hit.distance, Photon::unpack_unit_vector(hit.normal), diagonal);
                 let (near, same) = (is_hit && near, is_hit && same);
                 verdict.correct += f64::from(same);
                 verdict.wrong += f64::from(is_hit && !same);
@@ -87,15 +87,6 @@ pub(crate) fn judge(truths: &[Option<Truth>], hits: &[SurfaceHit], diagonal: f32
     verdict.hybrid /= all;
     verdict.error = [0.5, 0.95].map(|part| percentile(&mut errors, part));
     verdict
-}
-
-/// A unit vector from its octahedral bits.
-pub(crate) fn unpack(bits: u32) -> Vec3 {
-    let coordinate = |shift: u32| f32::from((bits >> shift) as u16 as i16) / 32767.0;
-    let (x, y) = (coordinate(0), coordinate(16));
-    let z = 1.0 - x.abs() - y.abs();
-    let fold = (-z).max(0.0);
-    Vec3::new(x - fold.copysign(x), y - fold.copysign(y), z).normalize()
 }
 
 /// Percentile of values, 0 for none.

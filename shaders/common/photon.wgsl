@@ -21,9 +21,9 @@ const PHOTON_BACK: u32 = 2048u;
 const PHOTON_CAUSTIC: u32 = 4096u;
 // It came straight from a flat light: set beside PHOTON_STARTED and PHOTON_FIRST_HIT.
 const PHOTON_OF_FLAT: u32 = 16384u;
-// What a path keeps from its emission: bits 16 to 23 the cell that it started in, bits 24 to 31 how much more densely photons
-// start there than if they were spread evenly, 0 if they are.
-const PHOTON_EMISSION: u32 = 0xffff0000u;
+// Of guided photons: bits 16 to 23 the cell that the path started in, bits 24 to 31 how much more densely photons come this way
+// than if they were spread evenly, 0 if they are.
+const PHOTON_GUIDED: u32 = 0xffff0000u;
 const PHOTON_BOOST_STEPS: f32 = 16.0;
 const PHOTON_BOOST_ONE: f32 = 128.0;
 
@@ -40,7 +40,7 @@ struct Photon {
     light_and_surface: u32,
 }
 
-fn photon_emission(cell: u32, boost: f32) -> u32 {
+fn photon_guided(cell: u32, boost: f32) -> u32 {
     return (cell << 16u) | (u32(clamp(PHOTON_BOOST_ONE + round(PHOTON_BOOST_STEPS * log2(boost)), 1.0, 255.0)) << 24u);
 }
 

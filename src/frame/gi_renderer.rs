@@ -6,8 +6,8 @@
 //! should stand.
 
 use super::caustic_view::CausticView;
-use super::emission_schedule::EmissionSchedule;
 use super::env_map_placement::{EnvMapPlacement, PlacementInputs, SelectionContext};
+use super::guiding_schedule::GuidingSchedule;
 use super::indirect_scene::{IndirectScene, PhotonInputs, PhotonPasses};
 use super::indirect_view::{IndirectView, IndirectViewInputs, ViewPasses};
 use super::recapture::Recapture;
@@ -23,9 +23,9 @@ use crate::pass::{
 #[cfg(feature = "bvh")]
 use crate::resource::BvhGeometry;
 use crate::resource::{
-    CameraView, CapturePurpose, CaptureView, DepthHierarchy, EmissionCells, EnvMapIrradiance, EnvMaps, Environment,
-    GBuffer, Geometry, Irradiance, Lights, MAX_LIGHTS, MarkedPixels, NearestOccluders, Photons, PrepareContext,
-    Radiance, ShadowMaps, Visibility,
+    CameraView, CapturePurpose, CaptureView, DepthHierarchy, EnvMapIrradiance, EnvMaps, Environment, GBuffer, Geometry,
+    GuidingTables, Irradiance, Lights, MAX_LIGHTS, MarkedPixels, NearestOccluders, Photons, PrepareContext, Radiance,
+    ShadowMaps, Visibility,
 };
 use crate::scene::{
     Camera, EmissiveTriangle, EnvironmentImage, Lamp, Light, LightKind, LightSources, Projection, SceneBounds,
@@ -66,7 +66,7 @@ pub struct GiRenderer {
     photons_frame: Option<UnitFrame>,
     /// Of the photons.
     sample_offset: u32,
-    emission: EmissionSchedule,
+    guiding: GuidingSchedule,
     /// This frame's share of the selection, and its views.
     selection: Option<(Work, std::ops::Range<usize>)>,
 }
@@ -237,7 +237,7 @@ impl GiRenderer {
             env_map_layers: Vec::new(),
             photons_frame: None,
             sample_offset: 0,
-            emission: EmissionSchedule::default(),
+            guiding: GuidingSchedule::default(),
             selection: None,
         })
     }
@@ -630,7 +630,7 @@ impl GiRenderer {
             .plan_frame(&self.settings.selector, has_photons, &mut self.views);
         self.selection = work.map(|w| (w, selection_from..self.views.len()));
         number(&mut self.views);
-        self.emission.follow(self.revision, cameras);
+        self.guiding.follow(self.revision, cameras);
         for (camera, view) in cameras.iter_mut().zip(&self.views) {
             camera.capture = *view;
         }
@@ -665,7 +665,7 @@ impl GiRenderer {
                 shadow_maps: &direct.shadow_maps,
                 views: &self.views[self.env_map_views.clone()],
                 layers: &self.env_map_layers,
-                updates_emission: self.emission.take_update(),
+                updates_guiding: self.guiding.take_update(),
                 area: self.state.as_ref().map_or(1.0, |s| s.area),
                 radius: self.state.as_ref().map_or(1.0, |s| s.frame.radius()),
             };
@@ -851,7 +851,7 @@ impl GiRenderer {
                 area: state.area,
                 radius: state.frame.radius(),
                 sample_offset: self.sample_offset,
-                counts_emission: self.emission.counts(),
+                counts_guiding: self.guiding.counts(),
             };
             own.record(encoder, &indirect_inputs)?;
             if let Some(caustic) = &mut resources.caustic {
@@ -994,9 +994,9 @@ impl GiRenderer {
         self.direct.as_ref().map(|d| &d.shadow_maps)
     }
 
-    /// Where photons start, while [`Settings::emission_importance`] is above 0 and there is indirect light.
-    pub fn emission_cells(&self) -> Option<&EmissionCells> {
-        self.indirect.as_ref().and_then(IndirectScene::emission_cells)
+    /// Where photons go, while [`Settings::guided_photons`] is above 0 and there is indirect light.
+    pub fn guiding_tables(&self) -> Option<&GuidingTables> {
+        self.indirect.as_ref().and_then(IndirectScene::guiding_tables)
     }
 
     /// Photons, while there is indirect light.

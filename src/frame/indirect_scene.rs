@@ -6,13 +6,13 @@ use crate::Error;
 #[cfg(feature = "bvh")]
 use crate::pass::BvhTracer;
 use crate::pass::{
-    Bandwidth, DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EmissionImportance,
-    EmissionImportanceResources, EmissionUpdateInputs, EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources,
-    EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources, EnvMapLightingSettings, FirstHits, ImageSpaceTracer,
-    PhotonEmitter, PhotonGrid, PhotonGridInputs, PhotonGridResources, PhotonSpread, SortedPhotons,
+    Bandwidth, DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EnvMapCapture,
+    EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources,
+    EnvMapLightingSettings, FirstHits, GuidingUpdateInputs, ImageSpaceTracer, PhotonEmitter, PhotonGrid,
+    PhotonGridInputs, PhotonGridResources, PhotonGuiding, PhotonGuidingResources, PhotonSpread, SortedPhotons,
 };
 use crate::resource::{
-    CaptureView, DepthHierarchy, EmissionCells, EnvMapIrradiance, EnvMaps, Lights, PhotonMap, PhotonTargets, Photons,
+    CaptureView, DepthHierarchy, EnvMapIrradiance, EnvMaps, GuidingTables, Lights, PhotonMap, PhotonTargets, Photons,
     ShadowMaps,
 };
 use crate::scene::{BoundingSphere, UnitFrame};
@@ -24,7 +24,7 @@ pub(super) struct PhotonPasses {
     /// If the method needs it.
     depth_hierarchy_build: Option<DepthHierarchyBuild>,
     /// If the settings use it.
-    pub(super) emission_importance: Option<EmissionImportance>,
+    pub(super) photon_guiding: Option<PhotonGuiding>,
     pub(super) photon_emitter: PhotonEmitter,
     /// Those that the settings use.
     pub(super) image_space_tracer: Option<ImageSpaceTracer>,
@@ -42,7 +42,7 @@ pub(super) struct PhotonPasses {
 pub(super) struct IndirectScene {
     global: TracedPhotons,
     /// If photons start where they count.
-    emission: Option<(EmissionCells, EmissionImportanceResources)>,
+    guiding: Option<(GuidingTables, PhotonGuidingResources)>,
     image_space: Option<ImageSpaceScene>,
     /// While caustics have photons of their own, and what these are aimed at.
     caustics: Option<(TracedPhotons, PhotonTargets)>,
@@ -75,7 +75,7 @@ pub(super) struct PhotonInputs<'a> {
     /// The layers that these are of.
     pub(super) layers: &'a [u32],
     /// Whether it is time to look where photons are seen.
-    pub(super) updates_emission: bool,
+    pub(super) updates_guiding: bool,
     /// Of all surfaces, unit frame.
     pub(super) area: f32,
     /// Of the region, unit frame.
@@ -89,7 +89,7 @@ impl PhotonPasses {
         Self {
             env_map_capture: EnvMapCapture::new(),
             depth_hierarchy_build: settings.needs_hierarchy().then(|| DepthHierarchyBuild::new(device)),
-            emission_importance: (settings.emission_importance > 0.0).then(|| EmissionImportance::new(device)),
+            photon_guiding: (settings.guided_photons > 0.0).then(|| PhotonGuiding::new(device)),
             photon_emitter: PhotonEmitter::new(device),
             image_space_tracer: kind.uses_env_maps().then(|| ImageSpaceTracer::new(device, method)),
             #[cfg(feature = "bvh")]
@@ -138,12 +138,12 @@ impl IndirectScene {
                 capture: EnvMapCaptureResources::new(device, settings.env_map_size)?,
             })
         };
-        let emission = || {
-            let cells = EmissionCells::new(device, queue)?;
-            Ok((cells, EmissionImportanceResources::new(device)?))
+        let guiding = || {
+            let tables = GuidingTables::new(device, queue)?;
+            Ok((tables, PhotonGuidingResources::new(device)?))
         };
         Ok(Self {
-            emission: (settings.emission_importance > 0.0).then(emission).transpose()?,
+            guiding: (settings.guided_photons > 0.0).then(guiding).transpose()?,
             image_space: settings.needs_env_maps().then(image_space).transpose()?,
             caustics: None,
             grid: None,
@@ -233,8 +233,8 @@ impl IndirectScene {
         self.image_space.as_ref()?.lighting.as_ref().map(|l| &l.0)
     }
 
-    pub(super) fn emission_cells(&self) -> Option<&EmissionCells> {
-        self.emission.as_ref().map(|e| &e.0)
+    pub(super) fn guiding_tables(&self) -> Option<&GuidingTables> {
+        self.guiding.as_ref().map(|e| &e.0)
     }
 
     pub(super) fn depth_hierarchy(&self) -> Option<&DepthHierarchy> {
@@ -277,14 +277,14 @@ impl IndirectScene {
                 build.record(encoder, own, &build_inputs);
             }
         }
-        if let (Some(pass), Some((cells, own))) = (&passes.emission_importance, &mut self.emission)
-            && inputs.updates_emission
+        if let (Some(pass), Some((tables, own))) = (&passes.photon_guiding, &mut self.guiding)
+            && inputs.updates_guiding
         {
-            let update_inputs = EmissionUpdateInputs {
+            let update_inputs = GuidingUpdateInputs {
                 queue: scene.queue,
                 lights: inputs.lights,
-                cells,
-                share: inputs.settings.emission_importance,
+                tables,
+                share: inputs.settings.guided_photons,
                 timestamps: scene.timestamps,
             };
             pass.record_update(encoder, own, &update_inputs);
@@ -292,9 +292,9 @@ impl IndirectScene {
         let env_maps = self.image_space.as_ref();
         let mut walk_inputs = WalkInputs {
             photons: inputs,
-            spread: match &self.emission {
+            spread: match &self.guiding {
                 None => PhotonSpread::Even,
-                Some((cells, _)) => PhotonSpread::Cells(cells),
+                Some((tables, _)) => PhotonSpread::Guided(tables),
             },
             first_hits: inputs.settings.first_hits,
             maps: env_maps.map(|i| (&i.env_maps, i.hierarchy.as_ref().map(|h| &h.0))),
@@ -368,8 +368,8 @@ impl IndirectScene {
     pub(super) fn memory_by_resource(&self) -> Vec<(&'static str, u64)> {
         let [photons, mut lost, mut uniforms] = self.global.memory_use();
         let mut list = vec![("photons", photons)];
-        if let Some((cells, own)) = &self.emission {
-            list.push(("emission_cells", cells.memory_use() + own.memory_use()));
+        if let Some((tables, own)) = &self.guiding {
+            list.push(("guiding_tables", tables.memory_use() + own.memory_use()));
         }
         if let Some(image_space) = &self.image_space {
             let maps = image_space.env_maps.memory_use() + image_space.capture.memory_use();

@@ -6,11 +6,11 @@ use crate::Error;
 #[cfg(feature = "bvh")]
 use crate::pass::{BvhTracerResources, BvhTracerSurfaceRayInputs};
 use crate::pass::{
-    EmissionImportanceInputs, EmissionImportanceResources, FinalGather, FinalGatherInputs, FinalGatherResources,
-    GlossyLight, ImageSpaceTracerRayInputs, ImageSpaceTracerResources, IrradianceFilter, IrradianceFilterInputs,
-    IrradianceFilterResources, IrradianceFilterSettings, MarkedSplatInputs, PhotonSplatter, PhotonSplatterInputs,
-    PhotonSplatterResources, PhotonSplatterSettings, SpecularPaths, SplatShape, Upsampler, UpsamplerInputs,
-    UpsamplerResources, progressive_scale,
+    FinalGather, FinalGatherInputs, FinalGatherResources, GlossyLight, ImageSpaceTracerRayInputs,
+    ImageSpaceTracerResources, IrradianceFilter, IrradianceFilterInputs, IrradianceFilterResources,
+    IrradianceFilterSettings, MarkedSplatInputs, PhotonGuidingInputs, PhotonGuidingResources, PhotonSplatter,
+    PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings, SpecularPaths, SplatShape, Upsampler,
+    UpsamplerInputs, UpsamplerResources, progressive_scale,
 };
 use crate::resource::{GBuffer, Irradiance, Lights, MarkedPixels, Photons, Subsampling, SurfaceRays};
 
@@ -35,7 +35,7 @@ pub(super) struct IndirectView {
     estimate: Estimate,
     estimated: Irradiance,
     /// If photons start where they count.
-    importance: Option<EmissionImportanceResources>,
+    guiding: Option<PhotonGuidingResources>,
     /// From coarse to fine, while fewer pixels are estimated than seen.
     levels: Vec<UpsampledLevel>,
 }
@@ -93,7 +93,7 @@ pub(super) struct IndirectViewInputs<'a> {
     /// Of the photons.
     pub(super) sample_offset: u32,
     /// Whether what is seen of photons counts for where the next ones start.
-    pub(super) counts_emission: bool,
+    pub(super) counts_guiding: bool,
 }
 
 impl ViewPasses {
@@ -142,11 +142,11 @@ impl IndirectView {
                 levels.push(UpsampledLevel::new(device, subsampling, size, is_marked)?);
             }
         }
-        let importance = (settings.emission_importance > 0.0).then(|| EmissionImportanceResources::new(device));
+        let guiding = (settings.guided_photons > 0.0).then(|| PhotonGuidingResources::new(device));
         Ok(Self {
             estimate,
             estimated,
-            importance: importance.transpose()?,
+            guiding: guiding.transpose()?,
             levels,
         })
     }
@@ -172,7 +172,7 @@ impl IndirectView {
             Estimate::FinalGather(own) => own.record(encoder, &self.estimated, inputs)?,
         }
         self.upsample(encoder, inputs);
-        self.count_emission(encoder, inputs);
+        self.count_guiding(encoder, inputs);
         Ok(())
     }
 
@@ -210,22 +210,22 @@ impl IndirectView {
         }
     }
 
-    fn count_emission(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &IndirectViewInputs<'_>) {
-        if let (Some(pass), Some(cells), Some(importance)) = (
-            &inputs.passes.1.emission_importance,
-            inputs.scene.emission_cells(),
-            &mut self.importance,
-        ) && inputs.counts_emission
+    fn count_guiding(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &IndirectViewInputs<'_>) {
+        if let (Some(pass), Some(tables), Some(own)) = (
+            &inputs.passes.1.photon_guiding,
+            inputs.scene.guiding_tables(),
+            &mut self.guiding,
+        ) && inputs.counts_guiding
         {
-            let importance_inputs = EmissionImportanceInputs {
+            let guiding_inputs = PhotonGuidingInputs {
                 queue: inputs.view.queue,
                 photons: inputs.scene.photons(),
                 lights: inputs.lights,
                 g_buffer: inputs.g_buffer,
-                cells,
+                tables,
                 timestamps: inputs.view.timestamps,
             };
-            pass.record(encoder, importance, &importance_inputs);
+            pass.record(encoder, own, &guiding_inputs);
         }
     }
 
@@ -236,8 +236,8 @@ impl IndirectView {
             Estimate::Splatting(own) => ("splatter", own.memory_use()),
             Estimate::FinalGather(own) => ("final_gather", own.memory_use()),
         });
-        if let Some(importance) = &self.importance {
-            list.push(("emission_importance", importance.memory_use()));
+        if let Some(guiding) = &self.guiding {
+            list.push(("photon_guiding", guiding.memory_use()));
         }
         if !self.levels.is_empty() {
             let levels = self.levels.iter().map(UpsampledLevel::memory_use);

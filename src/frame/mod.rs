@@ -2,9 +2,9 @@
 //! [`GiRenderer`] records them in order. It uses public passes only: whatever it does, a host can do by hand.
 
 mod caustic_view;
-mod emission_schedule;
 mod env_map_placement;
 mod gi_renderer;
+mod guiding_schedule;
 mod indirect_scene;
 mod indirect_view;
 mod plan;

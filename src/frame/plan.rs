@@ -26,7 +26,7 @@ pub enum Stage {
     /// How deep the surfaces in it lie, coarsely.
     DepthHierarchyBuild,
     /// Which photons count for the picture.
-    EmissionImportance,
+    PhotonGuiding,
     /// Photons from lights.
     PhotonEmitter,
     /// Photons from surface to surface, as environment maps see them.
@@ -136,7 +136,7 @@ impl Plan {
                 stage(Stage::EnvMapSelector, selection),
                 stage(Stage::EnvMapCapture, maps),
                 stage(Stage::DepthHierarchyBuild, hierarchies),
-                stage(Stage::EmissionImportance, importance(&indirect, settings)),
+                stage(Stage::PhotonGuiding, guiding(&indirect, settings)),
                 stage(Stage::PhotonEmitter, indirect.clone()),
                 stage(Stage::ImageSpaceTracer, image_space),
                 stage(Stage::BvhTracer, bvh),
@@ -237,11 +237,11 @@ fn map_stages(indirect: &(bool, String), settings: &Settings) -> [(bool, String)
     ]
 }
 
-fn importance(indirect: &(bool, String), settings: &Settings) -> (bool, String) {
-    match (indirect.0, settings.emission_importance > 0.0) {
+fn guiding(indirect: &(bool, String), settings: &Settings) -> (bool, String) {
+    match (indirect.0, settings.guided_photons > 0.0) {
         (false, _) => indirect.clone(),
         (true, false) => (false, "settings spread photons evenly".to_owned()),
-        (true, true) => (true, "photons start where paths were seen".to_owned()),
+        (true, true) => (true, "more photons go where paths were seen".to_owned()),
     }
 }
 

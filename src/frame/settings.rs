@@ -129,10 +129,11 @@ pub struct Settings {
     pub frames: u32,
     /// Photons emitted a frame. Cost grows in proportion; noise falls as the square root.
     pub photons: u32,
-    /// Share of the photons, from 0 and below 1, that start in those directions of their light whose paths were seen in the
-    /// frames before; the others are spread evenly. Pays where much of the light never comes before the eye, as that of a sun
-    /// over a building; costs a look at each photon.
-    pub emission_importance: f32,
+    /// Share of the photons, from 0 and below 1, that go in those directions, from their light and from diffuse surfaces, whose paths
+    /// were seen in the frames before; the others are spread evenly. Pays where much of the light never comes before the eye, as
+    /// through a doorway or of a sun over a building; costs two looks at each photon, and noise while things move. 0.5 is a good
+    /// start (`docs/density.md`).
+    pub guided_photons: f32,
     /// How photons find where they first land. Shadow maps are faster, and curved mirrors in them a little flattened. Those of
     /// caustics are traced wherever there are triangles, which then trace all of their hops.
     pub first_hits: FirstHits,
@@ -210,7 +211,7 @@ impl Settings {
             },
             specular_surfaces: 4,
             specular_paths: 1,
-            emission_importance: 0.0,
+            guided_photons: 0.0,
             env_map_count: 12,
             env_map_size: 64,
             environment_suns: 8,
@@ -241,7 +242,7 @@ impl Settings {
         Self {
             frames: 1,
             photons: 500_000,
-            emission_importance: 0.0,
+            guided_photons: 0.0,
             first_hits: FirstHits::default(),
             bounces: 3,
             env_map_count: 12,
@@ -282,7 +283,7 @@ impl Settings {
             },
             specular_surfaces: 12,
             specular_paths: 1,
-            emission_importance: 0.0,
+            guided_photons: 0.0,
             env_map_count: 16,
             env_map_size: 256,
             environment_suns: 48,
@@ -456,12 +457,9 @@ macro_rules! choice {
 const KNOBS: &[Knob] = &[
     field!("frames", "1 or more", frames, |v| v >= 1),
     field!("photons", "0 to 100000000", photons, |v| v <= 100_000_000),
-    field!(
-        "emission.importance",
-        "0 or more, and below 1",
-        emission_importance,
-        |v| (0.0..1.0).contains(&v)
-    ),
+    field!("photons.guided", "0 or more, and below 1", guided_photons, |v| (0.0
+        ..1.0)
+        .contains(&v)),
     choice!(
         "emission.first_hits",
         "shadow-maps or traced",

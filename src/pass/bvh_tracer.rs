@@ -10,7 +10,7 @@ use super::dispatch_64;
 use super::photon_walk::{PhotonWalk, PhotonWalkInputs, PhotonWalkResources, SharedHop};
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::bvh_geometry::BVH_SLOTS;
-use crate::resource::{BvhGeometry, EmissionCells, Photons, Rays, SurfaceRays};
+use crate::resource::{BvhGeometry, GuidingTables, Photons, Rays, SurfaceRays};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -94,10 +94,10 @@ pub struct BvhTracerInputs<'a> {
     pub photons: &'a Photons,
     /// `None`: the whole walk. A hop: this one, of the paths that the other tracer has listed.
     pub shared: Option<SharedHop<'a>>,
-    /// Which reflections more paths take from their first hit: the cells that they were emitted by ([`PhotonSpread::Cells`]).
+    /// Where more paths go on to from diffuse surfaces: the tables that they were emitted by, if any ([`PhotonSpread::Guided`]).
     ///
-    /// [`PhotonSpread::Cells`]: super::PhotonSpread::Cells
-    pub led_by: Option<&'a EmissionCells>,
+    /// [`PhotonSpread::Guided`]: super::PhotonSpread::Guided
+    pub guiding: Option<&'a GuidingTables>,
     /// As for the emitter.
     pub sample_offset: u32,
     /// Scatterings before Russian roulette may end a path. Lower is faster and noisier.
@@ -204,7 +204,7 @@ impl BvhTracer {
             shared: inputs.shared,
             sample_offset: inputs.sample_offset,
             roulette_from: inputs.roulette_from,
-            led_by: inputs.led_by,
+            guiding: inputs.guiding,
         };
         let Some(walk) = self.photon_walk.prepare(&mut resources.walk, &walk) else {
             return;

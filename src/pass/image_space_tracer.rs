@@ -10,7 +10,7 @@
 use super::dispatch_64;
 use super::photon_walk::{PhotonWalk, PhotonWalkInputs, PhotonWalkResources, PreparedWalk, SharedHop};
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
-use crate::resource::{DepthHierarchy, EmissionCells, EnvMaps, LostRays, Photons, RANGE_FORMAT, SurfaceRays};
+use crate::resource::{DepthHierarchy, EnvMaps, GuidingTables, LostRays, Photons, RANGE_FORMAT, SurfaceRays};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -167,10 +167,10 @@ pub struct ImageSpaceTracerInputs<'a> {
     pub photons: &'a Photons,
     /// `None`: the whole walk. A hop: this one, whose lost rays are listed.
     pub shared: Option<SharedHop<'a>>,
-    /// Which reflections more paths take from their first hit: the cells that they were emitted by ([`PhotonSpread::Cells`]).
+    /// Where more paths go on to from diffuse surfaces: the tables that they were emitted by, if any ([`PhotonSpread::Guided`]).
     ///
-    /// [`PhotonSpread::Cells`]: super::PhotonSpread::Cells
-    pub led_by: Option<&'a EmissionCells>,
+    /// [`PhotonSpread::Guided`]: super::PhotonSpread::Guided
+    pub guiding: Option<&'a GuidingTables>,
     /// As for the emitter.
     pub sample_offset: u32,
     /// How to trace.
@@ -274,7 +274,7 @@ impl ImageSpaceTracer {
             shared: inputs.shared,
             sample_offset: inputs.sample_offset,
             roulette_from: inputs.settings.roulette_from,
-            led_by: inputs.led_by,
+            guiding: inputs.guiding,
         };
         let maps = self.maps_group(
             resources,

@@ -11,7 +11,6 @@ mod capture;
 pub(crate) mod composite;
 pub(crate) mod depth_hierarchy_build;
 pub(crate) mod direct_light;
-pub(crate) mod emission_importance;
 mod env_map_capture;
 pub(crate) mod env_map_lighting;
 pub(crate) mod env_map_selector;
@@ -24,6 +23,7 @@ pub(crate) mod irradiance_filter;
 pub(crate) mod nearest_occluder;
 pub(crate) mod photon_emitter;
 pub(crate) mod photon_grid;
+pub(crate) mod photon_guiding;
 pub(crate) mod photon_splatter;
 pub(crate) mod photon_walk;
 mod shadow_map_capture;
@@ -42,9 +42,6 @@ pub use bvh_tracer::{
 pub use composite::{Composite, CompositeInputs, CompositeResources, CompositeSettings};
 pub use depth_hierarchy_build::{DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources};
 pub use direct_light::{DirectLight, DirectLightInputs, DirectLightResources};
-pub use emission_importance::{
-    EmissionImportance, EmissionImportanceInputs, EmissionImportanceResources, EmissionUpdateInputs,
-};
 pub use env_map_capture::{EnvMapCapture, EnvMapCaptureInputs, EnvMapCaptureResources};
 pub use env_map_lighting::{EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources, EnvMapLightingSettings};
 pub use env_map_selector::{
@@ -65,6 +62,7 @@ pub use irradiance_filter::{
 pub use nearest_occluder::{NearestOccluder, NearestOccluderInputs, NearestOccluderResources};
 pub use photon_emitter::{FirstHits, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources, PhotonSpread};
 pub use photon_grid::{PhotonGrid, PhotonGridInputs, PhotonGridResources, SortedPhotons};
+pub use photon_guiding::{GuidingUpdateInputs, PhotonGuiding, PhotonGuidingInputs, PhotonGuidingResources};
 pub(crate) use photon_splatter::LARGEST_RADIUS;
 pub use photon_splatter::{
     Bandwidth, BoundaryCorrection, Kernel, MarkedSplatInputs, PhotonSplatter, PhotonSplatterConfig,

@@ -9,7 +9,7 @@
 
 use super::dispatch_64;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
-use crate::resource::{EmissionCells, Lights, PhotonTargets, Photons, ShadowMaps};
+use crate::resource::{GuidingTables, Lights, PhotonTargets, Photons, ShadowMaps};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -45,17 +45,17 @@ pub(crate) const SPREAD_SLOTS: [Slot; 1] = [Slot::Storage];
 pub enum PhotonSpread<'a> {
     /// As the lights shine.
     Even,
-    /// As the lights shine, but more or less densely.
-    Cells(&'a EmissionCells),
+    /// As the lights shine, but more or less densely. The tracers' inputs take the same tables.
+    Guided(&'a GuidingTables),
     /// Towards targets alone, evenly in the solid angles that these fill.
     Targets(&'a PhotonTargets),
 }
 
 impl<'a> PhotonSpread<'a> {
-    /// What leads the walk as well.
-    pub(crate) fn cells(self) -> Option<&'a EmissionCells> {
+    /// What guides the walk as well.
+    pub(crate) fn guiding(self) -> Option<&'a GuidingTables> {
         match self {
-            Self::Cells(cells) => Some(cells),
+            Self::Guided(tables) => Some(tables),
             Self::Even | Self::Targets(_) => None,
         }
     }
@@ -184,7 +184,7 @@ impl PhotonEmitter {
         let group = resources.groups.get(&self.device, label, &self.layout, &bound);
         let (pipeline, spread) = match inputs.spread {
             PhotonSpread::Even => (&self.emit, None),
-            PhotonSpread::Cells(cells) => (&self.emit_by_cells, Some(cells.tables())),
+            PhotonSpread::Guided(tables) => (&self.emit_by_cells, Some(tables.emission())),
             PhotonSpread::Targets(targets) => (&self.emit_at_targets, Some(targets.buffer())),
         };
         let spread_group = spread.map(|buffer| {

@@ -3,7 +3,7 @@
 use super::dispatch_64;
 use crate::Error;
 use crate::gpu::{self as device, BindGroupCache, Slot};
-use crate::resource::{EmissionCells, LostRays, Photons};
+use crate::resource::{GuidingTables, LostRays, Photons};
 
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
@@ -20,7 +20,7 @@ pub(crate) mod gpu {
         pub(crate) row: u32,
         pub(crate) is_shared: u32,
         pub(crate) map: u32,
-        pub(crate) is_led: u32,
+        pub(crate) is_guided: u32,
     }
 }
 
@@ -64,7 +64,7 @@ pub(super) struct PhotonWalkInputs<'a> {
     pub(super) shared: Option<SharedHop<'a>>,
     pub(super) sample_offset: u32,
     pub(super) roulette_from: u32,
-    pub(super) led_by: Option<&'a EmissionCells>,
+    pub(super) guiding: Option<&'a GuidingTables>,
 }
 
 /// The uniform of a walk, written, and group 0.
@@ -108,12 +108,10 @@ impl PhotonWalk {
             row,
             is_shared: u32::from(inputs.shared.is_some()),
             map: inputs.photons.map() as u32,
-            is_led: u32::from(inputs.led_by.is_some()),
+            is_guided: u32::from(inputs.guiding.is_some()),
         };
         inputs.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&params));
-        let tables = inputs
-            .led_by
-            .map_or(&resources.no_tables, EmissionCells::reflection_tables);
+        let tables = inputs.guiding.map_or(&resources.no_tables, GuidingTables::reflection);
         let bound = [buffer.into(), inputs.photons.buffer().into(), tables.into()];
         Some(PreparedWalk {
             params: buffer.clone(),
@@ -133,7 +131,7 @@ impl PhotonWalkResources {
         Ok(Self {
             groups: BindGroupCache::for_uses(params.len()),
             params,
-            no_tables: EmissionCells::no_reflection_tables(device, label)?,
+            no_tables: GuidingTables::no_reflection(device, label)?,
         })
     }
 

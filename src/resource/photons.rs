@@ -18,9 +18,9 @@ pub struct Photon {
     /// still to be traced; `position`, `normal` and `direction` are those of its start. Bit 11: the surface's back is hit. Bit 12: it
     /// came by way of metal and glass alone, in a [`PhotonMap::Global`]. Bit 13, beside bit 10: the light's rays are parallel. Bit 14, beside
     /// bit 8 or 10: the light is flat. Bits 16
-    /// to 31, the same for all hops of a path, and 0 after its end: see [`EmissionCells`](super::EmissionCells); bits 16 to 23 are
-    /// the cell that it started in, bits 24 to 31 b where photons start 2^((b − 128) / 16) times as densely there as if they were
-    /// spread evenly, 0 where they are. Others 0.
+    /// to 31 are 0 where photons are spread evenly and after the path's end, else (see [`GuidingTables`](super::GuidingTables)) bits
+    /// 16 to 23 the cell that it started in, bits 24 to 31 b where photons come this way 2^((b − 128) / 16) times as densely as if
+    /// they were spread evenly. Others 0.
     pub state: u32,
     /// Radiant flux that the hop carried, unit frame, before the surface takes its share.
     pub flux: [f32; 3],
@@ -95,6 +95,15 @@ impl Photon {
         u32::from(x) | u32::from(y) << 16
     }
 
+    /// The unit vector that `normal` or `direction` holds, as `octahedral_unpack` of the shaders takes it.
+    pub fn unpack_unit_vector(bits: u32) -> Vec3 {
+        let [x, y] = [bits, bits >> 16].map(|b| (f32::from(b as u16 as i16) / 32767.0).max(-1.0));
+        let p = Vec2::new(x, y);
+        let z = 1.0 - p.x.abs() - p.y.abs();
+        let folded = (Vec2::ONE - p.yx().abs()) * Vec2::select(p.cmpge(Vec2::ZERO), Vec2::ONE, Vec2::NEG_ONE);
+        (if z >= 0.0 { p } else { folded }).extend(z).normalize()
+    }
+
     /// Linear RGB in [0, 1] as `reflectance` holds it, 11-11-10.
     pub fn pack_reflectance(rgb: [f32; 3]) -> u32 {
         let steps = |value: f32, most: f32| (value.clamp(0.0, 1.0) * most).round() as u32;
@@ -111,8 +120,9 @@ impl Photon {
         (self.light_and_surface >> 16) as u16
     }
 
-    /// How many times as densely photons start where this one's path did as if they were spread evenly, within 2.2 %.
-    pub fn emission_boost(&self) -> f32 {
+    /// How many times as densely photons come this one's way as if they were spread evenly, within 2.2 % for each time that the path
+    /// was guided.
+    pub fn guided_boost(&self) -> f32 {
         match self.state >> 24 {
             0 => 1.0,
             steps => ((steps as f32 - Self::BOOST_ONE) / Self::BOOST_STEPS).exp2(),
@@ -264,15 +274,6 @@ fn snorm16(value: f32) -> u16 {
 mod tests {
     use super::*;
 
-    /// Twin of `octahedral_unpack`.
-    fn unpack(bits: u32) -> Vec3 {
-        let [x, y] = [bits, bits >> 16].map(|b| f32::from(b as u16 as i16) / 32767.0);
-        let z = 1.0 - x.abs() - y.abs();
-        let fold = |a: f32, b: f32| (1.0 - b.abs()) * if a >= 0.0 { 1.0 } else { -1.0 };
-        let [x, y] = if z >= 0.0 { [x, y] } else { [fold(x, y), fold(y, x)] };
-        Vec3::new(x, y, z).normalize()
-    }
-
     #[test]
     fn a_packed_unit_vector_comes_back() {
         // Half a step of either coordinate moves the point of the octahedron by at most 2.5 / 65534, and the octahedron
@@ -282,7 +283,7 @@ mod tests {
             let z = 1.0 - 2.0 * i as f32 / 999.0;
             let (sin, cos) = (2.4 * i as f32).sin_cos();
             let v = Vec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z);
-            let error = (unpack(Photon::pack_unit_vector(v)) - v).length();
+            let error = (Photon::unpack_unit_vector(Photon::pack_unit_vector(v)) - v).length();
             assert!(error < worst, "{v}: {error}");
         }
         assert_eq!(Photon::pack_unit_vector(Vec3::Z), 0);

@@ -50,7 +50,7 @@ fn emit_photons_by_cells(@builtin(global_invocation_id) id: vec3u) {
     let index = id.y * params.row + id.x;
     if id.x < params.row && index < params.photon_count {
         let start = emission_start(light_of(index), random_pair(params.sample_offset + index, 0u));
-        emit_photon(index, start, photon_emission(start.cell, start.boost));
+        emit_photon(index, start, photon_guided(start.cell, start.boost));
     }
 }
 

@@ -3,7 +3,7 @@
 
 @group(0) @binding(0) var<uniform> walk: WalkParams;
 @group(0) @binding(1) var<storage, read_write> photons: array<Photon>;
-// For each light, for each of its emission cells
+// Where paths go on to from diffuse surfaces
 @group(0) @binding(2) var<storage, read> reflection_tables: array<ReflectionTable>;
 
 // Random dimensions of Russian roulette start here, above those of directions.
@@ -44,7 +44,7 @@ fn spread_from_point(density: f32) -> Spread {
 // What a hop arrives as that left `origin` in this direction.
 fn arrived(origin: Photon, flux: vec3f, direction: vec3f, spread: Spread, hit: Hit) -> Photon {
     let light = photon_light(origin.light_and_surface) | photon_lobe_light(hit.lobe);
-    let kept = origin.state & PHOTON_EMISSION;
+    let kept = origin.state & PHOTON_GUIDED;
     if hit.kind != HIT_SURFACE && hit.kind != HIT_TENTATIVE {
         let fate = select(PHOTON_LOST, PHOTON_ESCAPED, hit.kind == HIT_ESCAPED);
         return photon_gone(fate | kept, flux, direction, light);
@@ -105,51 +105,18 @@ fn next_specular(photon: Photon, flux: vec3f, scattering: Scattering) -> Photon 
 // One hop from a stored photon.
 fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) -> Photon {
     let normal = octahedral_unpack(photon.normal);
-    var reflection = Reflection(random_pair(sequence_index, 2u * bounce), 1.0);
+    var start = ReflectionStart(random_pair(sequence_index, 2u * bounce), 1.0);
     var origin = photon;
-    if walk.is_led == 1u {
-        reflection = led_reflection(reflection_table(photon.position, normal), reflection.u);
-        let emission = photon_emission(photon_cell(photon.state), photon_boost(photon.state) * reflection.boost);
-        origin.state = (photon.state & ~PHOTON_EMISSION) | emission;
+    if walk.is_guided == 1u {
+        start = reflection_start(reflection_table(photon.position, normal), start.u);
+        let guided = photon_guided(photon_cell(photon.state), photon_boost(photon.state) * start.boost);
+        origin.state = (photon.state & ~PHOTON_GUIDED) | guided;
     }
-    let local = sampling_cosine(reflection.u);
+    let local = sampling_cosine(start.u);
     let direction = normalize(sampling_frame(normal) * local);
     let hit = trace_ray(photon.position, normal, direction);
-    let spread = spread_from_point(reflection.boost * WALK_INVERSE_PI * local.z);
-    return arrived(origin, flux / reflection.boost, direction, spread, hit);
-}
-
-struct Reflection {
-    u: vec2f,
-    // How many times as many photons leave this way as would if they were spread evenly
-    boost: f32,
-}
-
-// Takes an evenly spread pair of numbers to one that is spread as a table says.
-fn led_reflection(table: u32, u: vec2f) -> Reflection {
-    var column = 0u;
-    while column + 1u < REFLECTION_CELLS && u.x >= reflection_tables[table].columns[column] {
-        column++;
-    }
-    var before = 0.0;
-    if column > 0u {
-        before = reflection_tables[table].columns[column - 1u];
-    }
-    let column_share = reflection_tables[table].columns[column] - before;
-    let x = clamp((u.x - before) / column_share, 0.0, 1.0);
-    let first = column * REFLECTION_CELLS;
-    var row = 0u;
-    while row + 1u < REFLECTION_CELLS && u.y >= reflection_tables[table].rows[first + row] {
-        row++;
-    }
-    before = 0.0;
-    if row > 0u {
-        before = reflection_tables[table].rows[first + row - 1u];
-    }
-    let row_share = reflection_tables[table].rows[first + row] - before;
-    let y = clamp((u.y - before) / row_share, 0.0, 1.0);
-    let place = (vec2f(f32(column), f32(row)) + vec2f(x, y)) / f32(REFLECTION_CELLS);
-    return Reflection(min(place, vec2f(0.99999994)), f32(REFLECTION_CELL_TOTAL) * column_share * row_share);
+    let spread = spread_from_point(start.boost * WALK_INVERSE_PI * local.z);
+    return arrived(origin, flux / start.boost, direction, spread, hit);
 }
 
 // The first hop of a photon that stands at its light.

@@ -1,25 +1,29 @@
-//! Photons that start where their paths are seen: what the tables say against where photons start, and light against light.
+//! Photons that go where their paths are seen: what the tables say against where photons go, and light against light.
 //! What it gains is in `docs/density.md`.
 
 mod common;
 
 use common::{Component, Gpu, Offline, assert_no_errors, gpu};
-use lightfall::Error;
 use lightfall::frame::{Settings, TracerKind};
-use lightfall::glam::DVec3;
+use lightfall::glam::{DVec3, Vec3};
 use lightfall::resource::{Photon, PhotonState};
 use lightfall::scene::{Light, Scene, samples};
+use lightfall::{Error, wgpu};
 use std::collections::BTreeSet;
 
 /// Cells along an axis of a light's emission.
 const CELLS: usize = 16;
+/// Cells along an axis of the directions from a diffuse surface.
+const REFLECTIONS: usize = 4;
+/// Places along an axis of the unit frame.
+const PLACES: f32 = 16.0;
 const SIZE: [u32; 2] = [48, 36];
 
 fn settings(importance: f32) -> Settings {
     Settings {
         frames: 1,
         photons: 30_000,
-        emission_importance: importance,
+        guided_photons: importance,
         tracer_kind: TracerKind::Bvh,
         ..Settings::fast()
     }
@@ -43,22 +47,43 @@ fn photons(gpu: &Gpu, offline: &Offline<'_>) -> Vec<Photon> {
     lightfall::read_buffer_blocking(&gpu.device, &gpu.queue, buffer).unwrap()
 }
 
-/// For each light: share of its photons by cell, as its table says.
-fn shares(gpu: &Gpu, offline: &Offline<'_>, lights: usize) -> Vec<Vec<f64>> {
-    let buffer = offline.renderer.emission_cells().unwrap().tables();
-    let all: Vec<f32> = lightfall::read_buffer_blocking(&gpu.device, &gpu.queue, buffer).unwrap();
+/// For each table: share of its photons by cell of N × N, as it says.
+fn shares<const N: usize>(gpu: &Gpu, tables: &wgpu::Buffer) -> Vec<Vec<f64>> {
+    let all: Vec<f32> = lightfall::read_buffer_blocking(&gpu.device, &gpu.queue, tables).unwrap();
     let step = |ends: &[f32], i: usize| f64::from(ends[i]) - if i == 0 { 0.0 } else { f64::from(ends[i - 1]) };
-    all.chunks_exact(CELLS + CELLS * CELLS)
-        .take(lights)
+    all.chunks_exact(N + N * N)
         .map(|table| {
-            let (columns, rows) = table.split_at(CELLS);
-            let cell = |i: usize| {
-                let rows = &rows[i / CELLS * CELLS..][..CELLS];
-                step(columns, i / CELLS) * step(rows, i % CELLS)
-            };
-            (0..CELLS * CELLS).map(cell).collect()
+            let (columns, rows) = table.split_at(N);
+            let cell = |i: usize| step(columns, i / N) * step(&rows[i / N * N..][..N], i % N);
+            (0..N * N).map(cell).collect()
         })
         .collect()
+}
+
+/// For each light: share of its photons by cell of its emission.
+fn emission_shares(gpu: &Gpu, offline: &Offline<'_>) -> Vec<Vec<f64>> {
+    shares::<CELLS>(gpu, offline.renderer.guiding_tables().unwrap().emission())
+}
+
+/// The table of reflections of a place and a normal, and the cell of a direction from there; `None` where rounding may decide.
+fn reflection(origin: &Photon, direction: Vec3) -> Option<(usize, usize)> {
+    let normal = Photon::unpack_unit_vector(origin.normal);
+    let scaled = (Vec3::from(origin.position) * 0.5 + 0.5) * PLACES;
+    let place = scaled.as_uvec3();
+    let axis = normal.abs().max_position();
+    let side = 2 * axis + usize::from(normal[axis] < 0.0);
+    let table = 6 * (place.x + 16 * (place.y + 16 * place.z)) as usize + side;
+    // The frame of Duff et al. 2017.
+    let sign = if normal.z >= 0.0 { 1.0 } else { -1.0 };
+    let a = -1.0 / (sign + normal.z);
+    let b = normal.x * normal.y * a;
+    let x = Vec3::new(1.0 + sign * normal.x * normal.x * a, sign * b, -sign * normal.x);
+    let y = Vec3::new(b, sign + normal.y * normal.y * a, -normal.y);
+    let turn = direction.dot(y).atan2(direction.dot(x)) / std::f32::consts::TAU;
+    let u = [1.0 - direction.dot(normal).powi(2), turn.rem_euclid(1.0)].map(|u| u * REFLECTIONS as f32);
+    let is_sure = |v: f32| (0.01..0.99).contains(&v.fract());
+    let cell = u[0] as usize * REFLECTIONS + u[1] as usize;
+    (u.into_iter().all(is_sure) && scaled.to_array().into_iter().all(is_sure)).then_some((table, cell))
 }
 
 #[test]
@@ -75,9 +100,9 @@ fn photons_start_as_densely_as_the_table_says_and_bring_as_much_light() {
     let even = rendered(&gpu, &scene, &settings(0.0));
     let led = rendered(&gpu, &scene, &settings(0.8));
     let count = settings(0.0).photons as usize;
-    let tables = shares(&gpu, &led, scene.lights.len());
+    let tables = emission_shares(&gpu, &led);
     let (even, led) = (photons(&gpu, &even), photons(&gpu, &led));
-    for (light, table) in tables.iter().enumerate() {
+    for (light, table) in tables.iter().take(scene.lights.len()).enumerate() {
         let own: Vec<&Photon> = led[..count].iter().filter(|p| p.light() as usize == light).collect();
         let total: f64 = table.iter().sum();
         assert!((total - 1.0).abs() < 1e-5, "light {light}: shares sum up to {total}");
@@ -91,7 +116,7 @@ fn photons_start_as_densely_as_the_table_says_and_bring_as_much_light() {
             // As much less light each as there are more of them.
             let boost = table[cell] / evenly;
             assert!((f64::from(photon.flux[1]) * boost / flux_of_one - 1.0).abs() < 1e-4);
-            assert!((f64::from(photon.emission_boost()) / boost - 1.0).abs() < 0.025);
+            assert!((f64::from(photon.guided_boost()) / boost - 1.0).abs() < 0.025);
         }
         // A low-discrepancy sequence: no cell is off by more than a few photons.
         let worst = found
@@ -134,6 +159,63 @@ fn photons_start_as_densely_as_the_table_says_and_bring_as_much_light() {
 }
 
 #[test]
+fn photons_go_on_as_densely_as_the_tables_say() {
+    let Some(gpu) = gpu() else { return };
+    let guided = rendered(&gpu, &doorway(), &settings(0.8));
+    let tables = shares::<REFLECTIONS>(&gpu, guided.renderer.guiding_tables().unwrap().reflection());
+    let all = photons(&gpu, &guided);
+    let count = settings(0.8).photons as usize;
+    let (mut checked, mut most) = (0, 0.0f64);
+    for (from, to) in all.iter().zip(&all[count..]) {
+        let way = || reflection(from, Photon::unpack_unit_vector(to.direction));
+        if to.state() == PhotonState::Empty {
+            continue;
+        }
+        let Some((table, cell)) = way() else { continue };
+        let boost = 16.0 * tables[table][cell];
+        let flux = f64::from(from.flux[1] * from.reflectance()[1]) / boost;
+        assert!(
+            (f64::from(to.flux[1]) / flux - 1.0).abs() < 1e-3,
+            "{} instead of {flux}, {boost} times as densely",
+            to.flux[1]
+        );
+        // Eight bits hold no more.
+        let whole = (f64::from(from.guided_boost()) * boost).min(245.2);
+        let found = f64::from(to.guided_boost());
+        assert!((found / whole - 1.0).abs() < 0.025, "{found} instead of {whole}");
+        (checked, most) = (checked + 1, boost.max(most));
+    }
+    println!(
+        "{checked} of {} hops, at most {most:.1} times as densely as evenly",
+        3 * count
+    );
+    assert!(checked > 2 * count && most > 4.0);
+    assert_no_errors(&gpu);
+}
+
+/// As many photons as those behind the doorway are worth, were they all of the same flux.
+#[test]
+fn more_photons_come_through_a_doorway() {
+    let Some(gpu) = gpu() else { return };
+    let worth = |share| {
+        let all = photons(&gpu, &rendered(&gpu, &doorway(), &settings(share)));
+        let count = settings(share).photons as usize;
+        let far = all[count..]
+            .iter()
+            .filter(|p| p.state() == PhotonState::Stored && p.position[2] > 0.1);
+        let (sum, squares) = far.fold((0.0, 0.0), |(sum, squares), p| {
+            let flux = f64::from(p.flux[1]);
+            (sum + flux, squares + flux * flux)
+        });
+        sum * sum / squares
+    };
+    let [even, guided] = [worth(0.0), worth(0.5)];
+    println!("{even:.0} spread evenly, {guided:.0} guided");
+    assert!(guided > 1.5 * even);
+    assert_no_errors(&gpu);
+}
+
+#[test]
 fn a_scene_at_rest_comes_to_the_same_bits() {
     let Some(gpu) = gpu() else { return };
     let scene = doorway();
@@ -142,26 +224,26 @@ fn a_scene_at_rest_comes_to_the_same_bits() {
     for _ in 0..10 {
         offline.render_frame(None).unwrap();
     }
-    let table = shares(&gpu, &offline, 1);
+    let table = emission_shares(&gpu, &offline);
     let image = offline.read().unwrap();
     offline.render_frame(None).unwrap();
     assert!(image.iter().flatten().any(|&v| v > 0.0));
     assert!(offline.read().unwrap() == image);
-    assert_eq!(shares(&gpu, &offline, 1), table);
+    assert_eq!(emission_shares(&gpu, &offline), table);
     assert_no_errors(&gpu);
 }
 
 #[test]
 fn all_photons_led_are_refused_and_none_need_no_memory() {
     let Some(gpu) = gpu() else { return };
-    let refused = Settings::fast().set("emission.importance", "1");
+    let refused = Settings::fast().set("photons.guided", "1");
     assert!(matches!(refused, Err(Error::InvalidSetting { .. })), "{refused:?}");
     let has_cells = |importance| {
         let offline = rendered(&gpu, &doorway(), &settings(importance));
         let list = offline.memory_by_resource();
         let names: BTreeSet<_> = list.iter().map(|(name, _)| *name).collect();
         assert_eq!(names.len(), list.len(), "each name once: {list:?}");
-        names.contains("emission_cells")
+        names.contains("guiding_tables")
     };
     assert!(!has_cells(0.0) && has_cells(0.5));
     assert_no_errors(&gpu);

@@ -1,4 +1,4 @@
-//! When the tables of where photons start are brought up to date: for some frames after what the views show has changed, so
+//! When the tables of where photons go are brought up to date: for some frames after what the views show has changed, so
 //! that a scene at rest is the same in every frame.
 
 use crate::resource::CameraView;
@@ -11,13 +11,13 @@ const UPDATES: u32 = 8;
 const ROUNDING: f32 = 1e-5;
 
 #[derive(Debug, Default)]
-pub(super) struct EmissionSchedule {
+pub(super) struct GuidingSchedule {
     /// Count of changes of light and geometry, and the views.
     subject: Option<(u64, Vec<CameraView>)>,
     updates: u32,
 }
 
-impl EmissionSchedule {
+impl GuidingSchedule {
     /// Notes what this frame's views show.
     pub(super) fn follow(&mut self, revision: u64, cameras: &[CameraView]) {
         let is_same = |(of, views): &(u64, Vec<CameraView>)| {
@@ -83,7 +83,7 @@ mod tests {
         let at = |x| DAffine3::from_translation(DVec3::new(x, 0.3, 4.0));
         let lens = |fov_y| Projection::Perspective { fov_y };
         let map = |half_height| Projection::Orthographic { half_height };
-        let mut schedule = EmissionSchedule::default();
+        let mut schedule = GuidingSchedule::default();
         let mut updates = |revision, projection, transform| {
             let frames = (0..2 * UPDATES).map(|i| {
                 schedule.follow(revision, &[view(projection, transform, CameraView::jitter(i))]);

@@ -1,22 +1,27 @@
-//! Sends photons where they count for the picture: more of them start in those parts of a light's emission whose paths were
-//! seen in earlier frames, each with less flux, so that no light is lost or gained.
+//! Sends photons where they count for the picture: more of them start, and go on from diffuse surfaces, in those directions whose
+//! paths were seen in earlier frames, each with less flux, so that no light is lost or gained.
 //!
-//! Inputs: [`Photons`] and a [`GBuffer`] of an earlier frame. Output: [`EmissionCells`], for [`PhotonEmitter`]. Cells get
-//! photons in proportion to the root of the share of their paths that was seen. Cost: a photon record and a depth texel for
-//! each hop and view, and a workgroup a light. Limits: 16 × 16 cells a light; how photons are divided among lights stays.
+//! Inputs: [`Photons`] and a [`GBuffer`] of an earlier frame. Output: [`GuidingTables`], for [`PhotonEmitter`] and the tracers.
+//! A direction's share is the mean, over the tiles of the view, of its part in the photons that the tile shows, so that a tile with
+//! few photons counts as much as one with many: what is lit through a doorway as much as what the lamp itself stands in. Sources:
+//! Peter and Pietrek 1998 (importance of photons for the picture); Vorba et al. 2014 (directions learned from earlier passes).
+//!
+//! Cost: twice a photon record and a depth texel for each hop and view, for those that are seen the hops before them, and 24 576
+//! tables of 16 numbers an update; 5 MB. Limits: 16 × 16 cells of a light's emission, 4 × 4 of the directions from each of 16³
+//! places; what is seen of photons in metals and glass does not count; how photons are divided among lights stays.
 //!
 //! [`PhotonEmitter`]: super::PhotonEmitter
 
 use super::dispatch_64;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
-use crate::resource::{EmissionCells, GBuffer, Lights, Photons};
-use crate::resource::emission_cells::TABLES;
+use crate::resource::guiding_tables::REFLECTION_TABLES;
+use crate::resource::{GBuffer, GuidingTables, Lights, Photons};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
-    /// Twin of `Params` in `shaders/pass/emission_importance/params.wgsl`.
+    /// Twin of `Params` in `shaders/pass/photon_guiding/params.wgsl`.
     #[derive(Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
     pub(crate) struct Params {
@@ -29,50 +34,46 @@ pub(crate) mod gpu {
     }
 }
 
-/// Bindings of `shaders/pass/emission_importance/count_visible.wgsl`, in order.
-pub(crate) const COUNT_SLOTS: [Slot; 6] = [
+/// Bindings of `shaders/pass/photon_guiding/count_visible.wgsl`, in order.
+pub(crate) const COUNT_SLOTS: [Slot; 7] = [
     Slot::Uniform,
     Slot::Storage,
+    Slot::StorageMut,
     Slot::StorageMut,
     Slot::Uniform,
     Slot::Texture,
     Slot::StorageMut,
 ];
 
-/// Bindings of `shaders/pass/emission_importance/update_tables.wgsl`, in order.
-pub(crate) const UPDATE_SLOTS: [Slot; 5] = [
-    Slot::Uniform,
-    Slot::StorageMut,
-    Slot::StorageMut,
-    Slot::StorageMut,
-    Slot::StorageMut,
-];
+/// Bindings of `shaders/pass/photon_guiding/update_emission.wgsl`, and of `update_reflections.wgsl`, in order.
+pub(crate) const UPDATE_SLOTS: [Slot; 4] = [Slot::Uniform, Slot::StorageMut, Slot::StorageMut, Slot::StorageMut];
 
 /// Tiles along each axis of a view. Twin of `TILES` in `count_visible.wgsl`.
-pub(crate) const TILES: u64 = 32;
+pub(crate) const TILES: u32 = 32;
 
 /// Part of what was counted in earlier frames that an update keeps: what a table says changes over a few frames.
 const KEPT: f32 = 0.75;
 
-/// Largest share of the photons that is led: the others keep an eye on all that may come to be seen.
+/// Largest share of the photons that is guided: the others keep an eye on all that may come to be seen.
 const MOST_SHARE: f32 = 0.999;
 
 /// The pass.
 #[derive(Debug)]
-pub struct EmissionImportance {
+pub struct PhotonGuiding {
     device: wgpu::Device,
     count_layout: wgpu::BindGroupLayout,
     update_layout: wgpu::BindGroupLayout,
     count_tiles: wgpu::ComputePipeline,
-    count: wgpu::ComputePipeline,
-    update: wgpu::ComputePipeline,
+    count_visible: wgpu::ComputePipeline,
+    update_emission: wgpu::ComputePipeline,
     update_reflections: wgpu::ComputePipeline,
 }
 
 /// Uniforms and bind groups, of a view or of the update.
 #[derive(Debug)]
-pub struct EmissionImportanceResources {
+pub struct PhotonGuidingResources {
     count: Step,
+    /// Photons that each tile of the view shows.
     tiles: wgpu::Buffer,
     update: Step,
 }
@@ -86,7 +87,7 @@ struct Step {
 
 /// What a view gives it.
 #[derive(Debug, Clone, Copy)]
-pub struct EmissionImportanceInputs<'a> {
+pub struct PhotonGuidingInputs<'a> {
     /// For the uniforms of this frame.
     pub queue: &'a wgpu::Queue,
     /// Paths of this frame.
@@ -96,33 +97,33 @@ pub struct EmissionImportanceInputs<'a> {
     /// Where they are seen.
     pub g_buffer: &'a GBuffer,
     /// What is counted is added.
-    pub cells: &'a EmissionCells,
+    pub tables: &'a GuidingTables,
     /// Sink for GPU time.
     pub timestamps: Option<&'a Timestamps>,
 }
 
 /// What an update needs.
 #[derive(Debug, Clone, Copy)]
-pub struct EmissionUpdateInputs<'a> {
+pub struct GuidingUpdateInputs<'a> {
     /// For the uniforms of this frame.
     pub queue: &'a wgpu::Queue,
     /// Lights of the frame.
     pub lights: &'a Lights,
     /// The tables are written, the counts cleared.
-    pub cells: &'a EmissionCells,
-    /// Share of the photons that start where paths were seen, from 0 to 0.999, or what is nearest to it; the others are
-    /// spread evenly, so that nothing is overlooked for good.
+    pub tables: &'a GuidingTables,
+    /// Share of the photons that go where paths were seen, at their light and at each diffuse surface, from 0 to 0.999, or what is
+    /// nearest to it; the others are spread evenly, so that nothing is overlooked for good.
     pub share: f32,
     /// Sink for GPU time.
     pub timestamps: Option<&'a Timestamps>,
 }
 
-impl EmissionImportance {
+impl PhotonGuiding {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
         let layout = |label, slots: &[Slot]| device::layout(device, label, wgpu::ShaderStages::COMPUTE, slots);
-        let count_layout = layout("lightfall::EmissionImportance::count", &COUNT_SLOTS);
-        let update_layout = layout("lightfall::EmissionImportance::update", &UPDATE_SLOTS);
+        let count_layout = layout("lightfall::PhotonGuiding::count", &COUNT_SLOTS);
+        let update_layout = layout("lightfall::PhotonGuiding::update", &UPDATE_SLOTS);
         let pipeline = |label, source, entry_point, layout| {
             let spec = ComputeSpec {
                 label,
@@ -133,30 +134,21 @@ impl EmissionImportance {
             };
             device::compute_pipeline(device, &spec)
         };
+        let count = |label, entry_point| pipeline(label, wgsl::PHOTON_GUIDING_COUNT, entry_point, &count_layout);
         Self {
             device: device.clone(),
-            count_tiles: pipeline(
-                "lightfall::EmissionImportance::count_tiles",
-                wgsl::EMISSION_IMPORTANCE_COUNT,
-                "count_tiles",
-                &count_layout,
-            ),
-            count: pipeline(
-                "lightfall::EmissionImportance::count",
-                wgsl::EMISSION_IMPORTANCE_COUNT,
-                "count_visible",
-                &count_layout,
-            ),
-            update_reflections: pipeline(
-                "lightfall::EmissionImportance::update_reflections",
-                wgsl::EMISSION_IMPORTANCE_UPDATE,
-                "update_reflections",
+            count_tiles: count("lightfall::PhotonGuiding::count_tiles", "count_tiles"),
+            count_visible: count("lightfall::PhotonGuiding::count_visible", "count_visible"),
+            update_emission: pipeline(
+                "lightfall::PhotonGuiding::update_emission",
+                wgsl::PHOTON_GUIDING_EMISSION,
+                "update_emission",
                 &update_layout,
             ),
-            update: pipeline(
-                "lightfall::EmissionImportance::update",
-                wgsl::EMISSION_IMPORTANCE_UPDATE,
-                "update_tables",
+            update_reflections: pipeline(
+                "lightfall::PhotonGuiding::update_reflections",
+                wgsl::PHOTON_GUIDING_REFLECTIONS,
+                "update_reflections",
                 &update_layout,
             ),
             count_layout,
@@ -169,8 +161,8 @@ impl EmissionImportance {
     pub fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        resources: &mut EmissionImportanceResources,
-        inputs: &EmissionImportanceInputs<'_>,
+        resources: &mut PhotonGuidingResources,
+        inputs: &PhotonGuidingInputs<'_>,
     ) {
         let (groups, row) = dispatch_64(inputs.photons.slots());
         let params = gpu::Params {
@@ -184,15 +176,18 @@ impl EmissionImportance {
         inputs
             .queue
             .write_buffer(&resources.count.params, 0, bytemuck::bytes_of(&params));
+        let [emission_counts, _] = inputs.tables.emission_counts();
+        let [reflection_counts, _] = inputs.tables.reflection_counts();
         let bound = [
             (&resources.count.params).into(),
             inputs.photons.buffer().into(),
-            inputs.cells.counts().into(),
+            emission_counts.into(),
+            reflection_counts.into(),
             inputs.g_buffer.view_buffer().into(),
             (&inputs.g_buffer.views().depth).into(),
             (&resources.tiles).into(),
         ];
-        let label = "lightfall::EmissionImportance::count";
+        let label = "lightfall::PhotonGuiding::count";
         let group = resources
             .count
             .groups
@@ -200,7 +195,7 @@ impl EmissionImportance {
         encoder.clear_buffer(&resources.tiles, 0, None);
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_bind_group(0, &group, &[]);
-        for pipeline in [&self.count_tiles, &self.count] {
+        for pipeline in [&self.count_tiles, &self.count_visible] {
             pass.set_pipeline(pipeline);
             pass.dispatch_workgroups(groups[0], groups[1], 1);
         }
@@ -210,8 +205,8 @@ impl EmissionImportance {
     pub fn record_update(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        resources: &mut EmissionImportanceResources,
-        inputs: &EmissionUpdateInputs<'_>,
+        resources: &mut PhotonGuidingResources,
+        inputs: &GuidingUpdateInputs<'_>,
     ) {
         let params = gpu::Params {
             path_count: 0,
@@ -228,48 +223,53 @@ impl EmissionImportance {
         inputs
             .queue
             .write_buffer(&resources.update.params, 0, bytemuck::bytes_of(&params));
-        let bound = [
-            (&resources.update.params).into(),
-            inputs.cells.counts().into(),
-            inputs.cells.history().into(),
-            inputs.cells.tables().into(),
-            inputs.cells.reflection_tables().into(),
-        ];
-        let label = "lightfall::EmissionImportance::update";
-        let group = resources
-            .update
-            .groups
-            .get(&self.device, label, &self.update_layout, &bound);
+        let label = "lightfall::PhotonGuiding::update";
+        let tables = inputs.tables;
+        let groups = [
+            (tables.emission_counts(), tables.emission()),
+            (tables.reflection_counts(), tables.reflection()),
+        ]
+        .map(|([counts, history], table)| {
+            let bound = [
+                (&resources.update.params).into(),
+                counts.into(),
+                history.into(),
+                table.into(),
+            ];
+            resources
+                .update
+                .groups
+                .get(&self.device, label, &self.update_layout, &bound)
+        });
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
-        pass.set_pipeline(&self.update);
-        pass.set_bind_group(0, &group, &[]);
+        pass.set_pipeline(&self.update_emission);
+        pass.set_bind_group(0, &groups[0], &[]);
         pass.dispatch_workgroups(inputs.lights.count(), 1, 1);
         pass.set_pipeline(&self.update_reflections);
-        pass.dispatch_workgroups((TABLES as u32).div_ceil(64), 1, 1);
+        pass.set_bind_group(0, &groups[1], &[]);
+        pass.dispatch_workgroups((REFLECTION_TABLES as u32).div_ceil(64), 1, 1);
     }
 }
 
-impl EmissionImportanceResources {
+impl PhotonGuidingResources {
     /// Resources on this device.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] if the device grants next to nothing.
     pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
-        let step = || -> Result<_, Error> {
+        use wgpu::BufferUsages as U;
+        let step = |uses| -> Result<_, Error> {
             Ok(Step {
-                params: device::uniform_buffer::<gpu::Params>(device, "lightfall::EmissionImportance::params")?,
-                groups: BindGroupCache::default(),
+                params: device::uniform_buffer::<gpu::Params>(device, "lightfall::PhotonGuiding::params")?,
+                groups: BindGroupCache::for_uses(uses),
             })
         };
+        let bytes = 4 * u64::from(TILES * TILES);
+        let usage = U::STORAGE | U::COPY_DST;
         Ok(Self {
-            count: step()?,
-            tiles: device::buffer(
-                device,
-                "lightfall::EmissionImportance::tiles",
-                4 * TILES * TILES,
-                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            )?,
-            update: step()?,
+            count: step(1)?,
+            tiles: device::buffer(device, "lightfall::PhotonGuiding::tiles", bytes, usage)?,
+            update: step(2)?,
         })
     }
 

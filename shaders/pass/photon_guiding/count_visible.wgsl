@@ -1,12 +1,13 @@
 // Weighs the hops that arrive where the eye sees by how much of their part of the image they stand for: first the photons of each
-// tile of the view are counted, then each hop brings its share of its tile to the cells that its path came by.
+// tile of the view are counted, then each hop brings its share of its tile to all cells that its path came by.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> photons: array<Photon>;
-@group(0) @binding(2) var<storage, read_write> counts: array<atomic<u32>>;
-@group(0) @binding(3) var<uniform> view: View;
-@group(0) @binding(4) var depth_texture: texture_2d<f32>;
-@group(0) @binding(5) var<storage, read_write> tiles: array<atomic<u32>, TILE_TOTAL>;
+@group(0) @binding(2) var<storage, read_write> emission_counts: array<atomic<u32>>;
+@group(0) @binding(3) var<storage, read_write> reflection_counts: array<atomic<u32>>;
+@group(0) @binding(4) var<uniform> view: View;
+@group(0) @binding(5) var depth_texture: texture_2d<f32>;
+@group(0) @binding(6) var<storage, read_write> tiles: array<atomic<u32>, TILE_TOTAL>;
 
 // Tiles along each axis of the view. Twin of `TILES`.
 const TILES: u32 = 32u;
@@ -75,17 +76,17 @@ fn count_visible(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let weight = u32(TILE_WEIGHT * f32(photon_count(photon)) / f32(atomicLoad(&tiles[tile])));
-    let cell = CELL_COUNTS * (light * EMISSION_CELL_TOTAL + photon_cell(photon.state));
-    atomicAdd(&counts[cell], weight);
-    atomicAdd(&counts[cell + 1u], 1u);
+    let emission = EMISSION_COUNTS * (light * EMISSION_CELL_TOTAL + photon_cell(photon.state));
+    atomicAdd(&emission_counts[emission], weight);
+    atomicAdd(&emission_counts[emission + 1u], 1u);
     for (var before = slot % params.path_count; before < slot; before += params.path_count) {
         let hop = photons[before];
         if !lobe_is_specular(photon_lobe(hop.state, hop.light_and_surface)) {
             let normal = octahedral_unpack(hop.normal);
             let direction = octahedral_unpack(photons[before + params.path_count].direction);
-            let table = REFLECTION_COUNTS_FROM + REFLECTION_COUNTS * reflection_table(hop.position, normal);
-            atomicAdd(&counts[table], 1u);
-            atomicAdd(&counts[table + 1u + reflection_cell(normal, direction)], weight);
+            let reflection = REFLECTION_COUNTS * reflection_table(hop.position, normal);
+            atomicAdd(&reflection_counts[reflection], 1u);
+            atomicAdd(&reflection_counts[reflection + 1u + reflection_cell(normal, direction)], weight);
         }
     }
 }
