@@ -239,7 +239,7 @@ fn twins() -> Vec<Twin> {
             base_color, alpha_cutoff, emission, metallic, roughness, transmission, index_of_refraction, _pad,
         }),
         twin!(wgsl::PHOTON_EMITTER, "Params", photon_emitter::gpu::Params {
-            photon_count, light_count, sample_offset, shadow_map_size, row, traces_first,
+            photon_count, light_count, sample_offset, shadow_map_size, row, traces_first, guided,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "Params", image_space_tracer::gpu::Params {
             map_count, map_size, iterations, epsilon, most_fetches, doubts_normals,
@@ -250,7 +250,7 @@ fn twins() -> Vec<Twin> {
             distance, kind, normal, reflectance, fetches, maps, steps, lobe,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "WalkParams", photon_walk::gpu::WalkParams {
-            photon_count, first_hop, last_hop, roulette_from, sample_offset, row, is_shared, map, is_guided,
+            photon_count, first_hop, last_hop, roulette_from, sample_offset, row, is_shared, map, guided,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER_LIST, "LostRays", lost_rays::gpu::LostRays { workgroups, count, paths }),
         #[cfg(feature = "bvh")]
@@ -721,8 +721,14 @@ fn photon_states_are_the_same_on_both_sides() {
     );
     assert_eq!(aimed.constant("PHOTON_TARGETS_LIGHTS"), Literal::U32(MAX_LIGHTS as u32));
     assert_eq!(shader.constant("PHOTON_TENTATIVE"), Literal::U32(Photon::TENTATIVE));
-    assert_eq!(shader.constant("PHOTON_BOOST_ONE"), Literal::F32(Photon::BOOST_ONE));
-    assert_eq!(shader.constant("PHOTON_BOOST_STEPS"), Literal::F32(Photon::BOOST_STEPS));
+    assert_eq!(
+        shader.constant("PHOTON_GUIDANCE_ONE"),
+        Literal::F32(Photon::GUIDANCE_ONE)
+    );
+    assert_eq!(
+        shader.constant("PHOTON_GUIDANCE_STEPS"),
+        Literal::F32(Photon::GUIDANCE_STEPS)
+    );
     let counts = Shader::new("PhotonGuiding count", wgsl::PHOTON_GUIDING_COUNT);
     for (name, own) in [
         ("EMISSION_CELLS", guiding_tables::CELLS),

@@ -8,40 +8,52 @@ struct EmissionTable {
     rows: array<f32, EMISSION_CELL_TOTAL>,
 }
 
-struct EmissionStart {
-    u: vec2f,
-    cell: u32,
-    // How many times as many photons start here as would if they were spread evenly
-    boost: f32,
-}
-
-// Takes an evenly spread pair of numbers to one that is spread as the table says. Neighbours stay neighbours.
-fn emission_start(light: u32, u: vec2f) -> EmissionStart {
+// Takes an evenly spread pair of numbers to one that is spread as a table says. Neighbours stay neighbours.
+fn emission_place(light: u32, u: vec2f) -> vec2f {
     var column = 0u;
     while column + 1u < EMISSION_CELLS && u.x >= emission_tables[light].columns[column] {
         column++;
     }
-    var before = 0.0;
-    if column > 0u {
-        before = emission_tables[light].columns[column - 1u];
-    }
-    let column_share = emission_tables[light].columns[column] - before;
-    let x = clamp((u.x - before) / column_share, 0.0, EMISSION_BELOW_ONE);
     let first = column * EMISSION_CELLS;
     var row = 0u;
     while row + 1u < EMISSION_CELLS && u.y >= emission_tables[light].rows[first + row] {
         row++;
     }
-    before = 0.0;
-    if row > 0u {
-        before = emission_tables[light].rows[first + row - 1u];
-    }
-    let row_share = emission_tables[light].rows[first + row] - before;
-    let y = clamp((u.y - before) / row_share, 0.0, EMISSION_BELOW_ONE);
-    let place = (vec2f(f32(column), f32(row)) + vec2f(x, y)) / f32(EMISSION_CELLS);
-    let boost = f32(EMISSION_CELL_TOTAL) * column_share * row_share;
-    return EmissionStart(min(place, vec2f(EMISSION_BELOW_ONE)), first + row, boost);
+    let before = emission_before(light, column, row);
+    let share = emission_share(light, column, row);
+    let within = clamp((u - before) / share, vec2f(0.0), vec2f(EMISSION_BELOW_ONE));
+    return (vec2f(f32(column), f32(row)) + within) / f32(EMISSION_CELLS);
 }
 
-// The largest f32 below 1.
-const EMISSION_BELOW_ONE: f32 = 0.99999994;
+// The cell of a pair of numbers.
+fn emission_cell_at(u: vec2f) -> u32 {
+    let at = min(vec2u(u * f32(EMISSION_CELLS)), vec2u(EMISSION_CELLS - 1u));
+    return at.x * EMISSION_CELLS + at.y;
+}
+
+// How many times as densely a table places pairs in a cell as if they were spread evenly.
+fn emission_guidance(light: u32, cell: u32) -> f32 {
+    let share = emission_share(light, cell / EMISSION_CELLS, cell % EMISSION_CELLS);
+    return f32(EMISSION_CELLS * EMISSION_CELLS) * share.x * share.y;
+}
+
+// Sums of shares up to the column and to the row.
+fn emission_before(light: u32, column: u32, row: u32) -> vec2f {
+    var before = vec2f(0.0);
+    if column > 0u {
+        before.x = emission_tables[light].columns[column - 1u];
+    }
+    if row > 0u {
+        before.y = emission_tables[light].rows[column * EMISSION_CELLS + row - 1u];
+    }
+    return before;
+}
+
+// Share of the column, and of the row in it.
+fn emission_share(light: u32, column: u32, row: u32) -> vec2f {
+    let ends = vec2f(emission_tables[light].columns[column], emission_tables[light].rows[column * EMISSION_CELLS + row]);
+    return ends - emission_before(light, column, row);
+}
+
+// A little below 1: no sum with a column's number is rounded up.
+const EMISSION_BELOW_ONE: f32 = 1.0 - 0x1p-18;

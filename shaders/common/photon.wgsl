@@ -21,11 +21,12 @@ const PHOTON_BACK: u32 = 2048u;
 const PHOTON_CAUSTIC: u32 = 4096u;
 // It came straight from a flat light: set beside PHOTON_STARTED and PHOTON_FIRST_HIT.
 const PHOTON_OF_FLAT: u32 = 16384u;
-// Of guided photons: bits 16 to 23 the cell that the path started in, bits 24 to 31 how much more densely photons come this way
-// than if they were spread evenly, 0 if they are.
-const PHOTON_GUIDED: u32 = 0xffff0000u;
-const PHOTON_BOOST_STEPS: f32 = 16.0;
-const PHOTON_BOOST_ONE: f32 = 128.0;
+// While some photons are guided: bit 15 whether this one is, bits 16 to 23 the cell that the path started in, bits 24 to 31 how many
+// times as densely guided ones come this way as those that are spread evenly, in steps of a doubling. Else 0.
+const PHOTON_GUIDING: u32 = 0xffff8000u;
+const PHOTON_IS_GUIDED: u32 = 0x8000u;
+const PHOTON_GUIDANCE_STEPS: f32 = 8.0;
+const PHOTON_GUIDANCE_ONE: f32 = 128.0;
 
 struct Photon {
     position: vec3f,
@@ -40,8 +41,12 @@ struct Photon {
     light_and_surface: u32,
 }
 
-fn photon_guided(cell: u32, boost: f32) -> u32 {
-    return (cell << 16u) | (u32(clamp(PHOTON_BOOST_ONE + round(PHOTON_BOOST_STEPS * log2(boost)), 1.0, 255.0)) << 24u);
+// Rounded up or down by chance, so that the mean of the inverse is right.
+fn photon_guiding(is_guided: bool, cell: u32, guidance: f32, chance: f32) -> u32 {
+    let steps = clamp(PHOTON_GUIDANCE_ONE + PHOTON_GUIDANCE_STEPS * log2(guidance), 1.0, 254.0);
+    let above = steps - floor(steps);
+    let is_up = chance * (1.0 - exp2(-1.0 / PHOTON_GUIDANCE_STEPS)) < 1.0 - exp2(-above / PHOTON_GUIDANCE_STEPS);
+    return select(0u, PHOTON_IS_GUIDED, is_guided) | (cell << 16u) | ((u32(steps) + u32(is_up)) << 24u);
 }
 
 fn photon_light(light_and_surface: u32) -> u32 {
@@ -69,9 +74,14 @@ fn photon_cell(state: u32) -> u32 {
     return (state >> 16u) & 255u;
 }
 
-fn photon_boost(state: u32) -> f32 {
-    let steps = f32(state >> 24u) - PHOTON_BOOST_ONE;
-    return select(exp2(steps / PHOTON_BOOST_STEPS), 1.0, (state >> 24u) == 0u);
+fn photon_guidance(state: u32) -> f32 {
+    let steps = f32(state >> 24u) - PHOTON_GUIDANCE_ONE;
+    return select(exp2(steps / PHOTON_GUIDANCE_STEPS), 1.0, (state >> 24u) == 0u);
+}
+
+// How many times as densely photons of which a share is guided come this way as if all were spread evenly.
+fn photon_boost(state: u32, share: f32) -> f32 {
+    return mix(1.0, photon_guidance(state), share);
 }
 
 // The footprint of a photon, both numbers as the upper halves of their bits: within 0.4 %. Its own number is finite, for its

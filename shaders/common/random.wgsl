@@ -8,6 +8,11 @@ fn random_unit(sequence_index: u32, dimension: u32) -> f32 {
     return hash_unit(sequence_index, dimension);
 }
 
+// To round by chance what guides the hop that leaves the b-th surface, the light being the 0-th: dimensions above those of the walk.
+fn random_guidance(sequence_index: u32, bounce: u32) -> f32 {
+    return hash_unit(sequence_index, 3072u + bounce);
+}
+
 // A pair that is evenly spread by itself and beside the Halton sequence: an additive recurrence by powers of the plastic
 // number's inverse (Roberts 2018), in integer arithmetic.
 fn random_recurrence(sequence_index: u32) -> vec2f {

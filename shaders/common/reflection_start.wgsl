@@ -1,38 +1,45 @@
-// How a path leaves a diffuse surface as a table says. The file that uses it binds `reflection_tables`.
+// Where paths leave diffuse surfaces as tables say. The file that uses it binds `reflection_tables`.
 
-struct ReflectionStart {
-    u: vec2f,
-    // How many times as many photons leave this way as would if they were spread evenly
-    boost: f32,
-}
-
-// Takes an evenly spread pair of numbers to one that is spread as the table says. Neighbours stay neighbours.
-fn reflection_start(table: u32, u: vec2f) -> ReflectionStart {
+// Takes an evenly spread pair of numbers to one that is spread as a table says. Neighbours stay neighbours.
+fn reflection_place(table: u32, u: vec2f) -> vec2f {
     var column = 0u;
     while column + 1u < REFLECTION_CELLS && u.x >= reflection_tables[table].columns[column] {
         column++;
     }
-    var before = 0.0;
-    if column > 0u {
-        before = reflection_tables[table].columns[column - 1u];
-    }
-    let column_share = reflection_tables[table].columns[column] - before;
-    let x = clamp((u.x - before) / column_share, 0.0, REFLECTION_BELOW_ONE);
     let first = column * REFLECTION_CELLS;
     var row = 0u;
     while row + 1u < REFLECTION_CELLS && u.y >= reflection_tables[table].rows[first + row] {
         row++;
     }
-    before = 0.0;
-    if row > 0u {
-        before = reflection_tables[table].rows[first + row - 1u];
-    }
-    let row_share = reflection_tables[table].rows[first + row] - before;
-    let y = clamp((u.y - before) / row_share, 0.0, REFLECTION_BELOW_ONE);
-    let place = (vec2f(f32(column), f32(row)) + vec2f(x, y)) / f32(REFLECTION_CELLS);
-    let boost = f32(REFLECTION_CELL_TOTAL) * column_share * row_share;
-    return ReflectionStart(min(place, vec2f(REFLECTION_BELOW_ONE)), boost);
+    let before = reflection_before(table, column, row);
+    let share = reflection_share(table, column, row);
+    let within = clamp((u - before) / share, vec2f(0.0), vec2f(REFLECTION_BELOW_ONE));
+    return (vec2f(f32(column), f32(row)) + within) / f32(REFLECTION_CELLS);
 }
 
-// The largest f32 below 1.
-const REFLECTION_BELOW_ONE: f32 = 0.99999994;
+// How many times as densely a table places pairs in a cell as if they were spread evenly.
+fn reflection_guidance(table: u32, cell: u32) -> f32 {
+    let share = reflection_share(table, cell / REFLECTION_CELLS, cell % REFLECTION_CELLS);
+    return f32(REFLECTION_CELLS * REFLECTION_CELLS) * share.x * share.y;
+}
+
+// Sums of shares up to the column and to the row.
+fn reflection_before(table: u32, column: u32, row: u32) -> vec2f {
+    var before = vec2f(0.0);
+    if column > 0u {
+        before.x = reflection_tables[table].columns[column - 1u];
+    }
+    if row > 0u {
+        before.y = reflection_tables[table].rows[column * REFLECTION_CELLS + row - 1u];
+    }
+    return before;
+}
+
+// Share of the column, and of the row in it.
+fn reflection_share(table: u32, column: u32, row: u32) -> vec2f {
+    let ends = vec2f(reflection_tables[table].columns[column], reflection_tables[table].rows[column * REFLECTION_CELLS + row]);
+    return ends - reflection_before(table, column, row);
+}
+
+// A little below 1: no sum with a column's number is rounded up.
+const REFLECTION_BELOW_ONE: f32 = 1.0 - 0x1p-18;

@@ -27,9 +27,13 @@ fn reflection_table(position: vec3f, normal: vec3f) -> u32 {
     return 6u * place + 2u * axis + u32(normal[axis] < 0.0);
 }
 
-// The cell of a direction about a normal.
-fn reflection_cell(normal: vec3f, direction: vec3f) -> u32 {
-    let u = sampling_cosine_inverse(direction * sampling_frame(normal));
+// The cell of a pair of numbers.
+fn reflection_cell_at(u: vec2f) -> u32 {
     let at = min(vec2u(u * f32(REFLECTION_CELLS)), vec2u(REFLECTION_CELLS - 1u));
     return at.x * REFLECTION_CELLS + at.y;
+}
+
+// The cell of a direction about a normal.
+fn reflection_cell(normal: vec3f, direction: vec3f) -> u32 {
+    return reflection_cell_at(sampling_cosine_inverse(direction * sampling_frame(normal)));
 }

@@ -8,7 +8,7 @@ use crate::pass::BvhTracer;
 use crate::pass::{
     Bandwidth, DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EnvMapCapture,
     EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources,
-    EnvMapLightingSettings, FirstHits, GuidingUpdateInputs, ImageSpaceTracer, PhotonEmitter, PhotonGrid,
+    EnvMapLightingSettings, FirstHits, Guiding, GuidingUpdateInputs, ImageSpaceTracer, PhotonEmitter, PhotonGrid,
     PhotonGridInputs, PhotonGridResources, PhotonGuiding, PhotonGuidingResources, PhotonSpread, SortedPhotons,
 };
 use crate::resource::{
@@ -284,7 +284,6 @@ impl IndirectScene {
                 queue: scene.queue,
                 lights: inputs.lights,
                 tables,
-                share: inputs.settings.guided_photons,
                 timestamps: scene.timestamps,
             };
             pass.record_update(encoder, own, &update_inputs);
@@ -294,7 +293,10 @@ impl IndirectScene {
             photons: inputs,
             spread: match &self.guiding {
                 None => PhotonSpread::Even,
-                Some((tables, _)) => PhotonSpread::Guided(tables),
+                Some((tables, _)) => PhotonSpread::Guided(Guiding {
+                    tables,
+                    share: inputs.settings.guided_photons,
+                }),
             },
             first_hits: inputs.settings.first_hits,
             maps: env_maps.map(|i| (&i.env_maps, i.hierarchy.as_ref().map(|h| &h.0))),

@@ -6,7 +6,7 @@ use crate::Error;
 #[cfg(feature = "bvh")]
 use crate::pass::{BvhTracerResources, BvhTracerSurfaceRayInputs};
 use crate::pass::{
-    FinalGather, FinalGatherInputs, FinalGatherResources, GlossyLight, ImageSpaceTracerRayInputs,
+    FinalGather, FinalGatherInputs, FinalGatherResources, GlossyLight, Guiding, ImageSpaceTracerRayInputs,
     ImageSpaceTracerResources, IrradianceFilter, IrradianceFilterInputs, IrradianceFilterResources,
     IrradianceFilterSettings, MarkedSplatInputs, PhotonGuidingInputs, PhotonGuidingResources, PhotonSplatter,
     PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings, SpecularPaths, SplatShape, Upsampler,
@@ -222,7 +222,10 @@ impl IndirectView {
                 photons: inputs.scene.photons(),
                 lights: inputs.lights,
                 g_buffer: inputs.g_buffer,
-                tables,
+                guiding: Guiding {
+                    tables,
+                    share: inputs.settings.guided_photons,
+                },
                 timestamps: inputs.view.timestamps,
             };
             pass.record(encoder, own, &guiding_inputs);

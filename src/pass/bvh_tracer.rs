@@ -7,10 +7,11 @@
 //! GPU alone is not in the trees. No ray is lost: it meets a triangle or has escaped.
 
 use super::dispatch_64;
+use super::photon_guiding::Guiding;
 use super::photon_walk::{PhotonWalk, PhotonWalkInputs, PhotonWalkResources, SharedHop};
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::bvh_geometry::BVH_SLOTS;
-use crate::resource::{BvhGeometry, GuidingTables, Photons, Rays, SurfaceRays};
+use crate::resource::{BvhGeometry, Photons, Rays, SurfaceRays};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -94,10 +95,10 @@ pub struct BvhTracerInputs<'a> {
     pub photons: &'a Photons,
     /// `None`: the whole walk. A hop: this one, of the paths that the other tracer has listed.
     pub shared: Option<SharedHop<'a>>,
-    /// Where more paths go on to from diffuse surfaces: the tables that they were emitted by, if any ([`PhotonSpread::Guided`]).
+    /// What guided their emission, if anything did ([`PhotonSpread::Guided`]).
     ///
     /// [`PhotonSpread::Guided`]: super::PhotonSpread::Guided
-    pub guiding: Option<&'a GuidingTables>,
+    pub guiding: Option<Guiding<'a>>,
     /// As for the emitter.
     pub sample_offset: u32,
     /// Scatterings before Russian roulette may end a path. Lower is faster and noisier.

@@ -8,9 +8,10 @@
 //! ([`TraceStatistics`](super::TraceStatistics) adds them up).
 
 use super::dispatch_64;
+use super::photon_guiding::Guiding;
 use super::photon_walk::{PhotonWalk, PhotonWalkInputs, PhotonWalkResources, PreparedWalk, SharedHop};
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
-use crate::resource::{DepthHierarchy, EnvMaps, GuidingTables, LostRays, Photons, RANGE_FORMAT, SurfaceRays};
+use crate::resource::{DepthHierarchy, EnvMaps, LostRays, Photons, RANGE_FORMAT, SurfaceRays};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -167,10 +168,10 @@ pub struct ImageSpaceTracerInputs<'a> {
     pub photons: &'a Photons,
     /// `None`: the whole walk. A hop: this one, whose lost rays are listed.
     pub shared: Option<SharedHop<'a>>,
-    /// Where more paths go on to from diffuse surfaces: the tables that they were emitted by, if any ([`PhotonSpread::Guided`]).
+    /// What guided their emission, if anything did ([`PhotonSpread::Guided`]).
     ///
     /// [`PhotonSpread::Guided`]: super::PhotonSpread::Guided
-    pub guiding: Option<&'a GuidingTables>,
+    pub guiding: Option<Guiding<'a>>,
     /// As for the emitter.
     pub sample_offset: u32,
     /// How to trace.

@@ -8,8 +8,9 @@
 //! their light, whatever its extent.
 
 use super::dispatch_64;
+use super::photon_guiding::Guiding;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
-use crate::resource::{GuidingTables, Lights, PhotonTargets, Photons, ShadowMaps};
+use crate::resource::{Lights, PhotonTargets, Photons, ShadowMaps};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -25,6 +26,7 @@ pub(crate) mod gpu {
         pub(crate) shadow_map_size: u32,
         pub(crate) row: u32,
         pub(crate) traces_first: u32,
+        pub(crate) guided: f32,
     }
 }
 
@@ -45,17 +47,17 @@ pub(crate) const SPREAD_SLOTS: [Slot; 1] = [Slot::Storage];
 pub enum PhotonSpread<'a> {
     /// As the lights shine.
     Even,
-    /// As the lights shine, but more or less densely. The tracers' inputs take the same tables.
-    Guided(&'a GuidingTables),
+    /// As the lights shine, but more or less densely. The tracers' inputs take the same.
+    Guided(Guiding<'a>),
     /// Towards targets alone, evenly in the solid angles that these fill.
     Targets(&'a PhotonTargets),
 }
 
 impl<'a> PhotonSpread<'a> {
     /// What guides the walk as well.
-    pub(crate) fn guiding(self) -> Option<&'a GuidingTables> {
+    pub(crate) fn guiding(self) -> Option<Guiding<'a>> {
         match self {
-            Self::Guided(tables) => Some(tables),
+            Self::Guided(guiding) => Some(guiding),
             Self::Even | Self::Targets(_) => None,
         }
     }
@@ -169,6 +171,7 @@ impl PhotonEmitter {
             shadow_map_size: inputs.shadow_maps.size(),
             row,
             traces_first: u32::from(inputs.first_hits == FirstHits::Traced),
+            guided: inputs.spread.guiding().map_or(0.0, |guiding| guiding.share()),
         };
         inputs
             .queue
@@ -184,7 +187,7 @@ impl PhotonEmitter {
         let group = resources.groups.get(&self.device, label, &self.layout, &bound);
         let (pipeline, spread) = match inputs.spread {
             PhotonSpread::Even => (&self.emit, None),
-            PhotonSpread::Guided(tables) => (&self.emit_by_cells, Some(tables.emission())),
+            PhotonSpread::Guided(guiding) => (&self.emit_by_cells, Some(guiding.tables.emission())),
             PhotonSpread::Targets(targets) => (&self.emit_at_targets, Some(targets.buffer())),
         };
         let spread_group = spread.map(|buffer| {

@@ -1,5 +1,5 @@
 //! Sends photons where they count for the picture: more of them start, and go on from diffuse surfaces, in those directions whose
-//! paths were seen in earlier frames, each with less flux, so that no light is lost or gained.
+//! paths were seen in earlier frames, each with less flux, so that no light is lost or gained on average.
 //!
 //! Inputs: [`Photons`] and a [`GBuffer`] of an earlier frame. Output: [`GuidingTables`], for [`PhotonEmitter`] and the tracers.
 //! A direction's share is the mean, over the tiles of the view, of its part in the photons that the tile shows, so that a tile with
@@ -8,7 +8,8 @@
 //!
 //! Cost: twice a photon record and a depth texel for each hop and view, for those that are seen the hops before them, and 24 576
 //! tables of 16 numbers an update; 5 MB. Limits: 16 × 16 cells of a light's emission, 4 × 4 of the directions from each of 16³
-//! places; what is seen of photons in metals and glass does not count; how photons are divided among lights stays.
+//! places; what is seen of photons in metals and glass does not count; how photons are divided among lights stays;
+//! while the same paths are drawn in every frame, tables fit these, and one to two hundredths of the light are missing.
 //!
 //! [`PhotonEmitter`]: super::PhotonEmitter
 
@@ -57,6 +58,29 @@ const KEPT: f32 = 0.75;
 /// Largest share of the photons that is guided: the others keep an eye on all that may come to be seen.
 const MOST_SHARE: f32 = 0.999;
 
+/// What guides photons, and how many of them.
+#[derive(Debug, Clone, Copy)]
+pub struct Guiding<'a> {
+    /// Where they go.
+    pub tables: &'a GuidingTables,
+    /// Share of the paths that are guided, at their light and at each diffuse surface, from 0 to 0.999, or what is nearest to it; the
+    /// others are spread evenly, so that nothing is overlooked for good. Flux is weighed by the density of both together (Veach 1997,
+    /// balance heuristic): no photon is worth more than 1 / (1 − share) of those of a frame without guiding. The same for the emission,
+    /// the walk and the count of a frame.
+    pub share: f32,
+}
+
+impl Guiding<'_> {
+    /// In its range.
+    pub(super) fn share(&self) -> f32 {
+        if self.share > 0.0 {
+            self.share.min(MOST_SHARE)
+        } else {
+            0.0
+        }
+    }
+}
+
 /// The pass.
 #[derive(Debug)]
 pub struct PhotonGuiding {
@@ -96,8 +120,8 @@ pub struct PhotonGuidingInputs<'a> {
     pub lights: &'a Lights,
     /// Where they are seen.
     pub g_buffer: &'a GBuffer,
-    /// What is counted is added.
-    pub tables: &'a GuidingTables,
+    /// What they were guided by. What is counted is added to its tables.
+    pub guiding: Guiding<'a>,
     /// Sink for GPU time.
     pub timestamps: Option<&'a Timestamps>,
 }
@@ -111,9 +135,6 @@ pub struct GuidingUpdateInputs<'a> {
     pub lights: &'a Lights,
     /// The tables are written, the counts cleared.
     pub tables: &'a GuidingTables,
-    /// Share of the photons that go where paths were seen, at their light and at each diffuse surface, from 0 to 0.999, or what is
-    /// nearest to it; the others are spread evenly, so that nothing is overlooked for good.
-    pub share: f32,
     /// Sink for GPU time.
     pub timestamps: Option<&'a Timestamps>,
 }
@@ -170,14 +191,14 @@ impl PhotonGuiding {
             slot_count: inputs.photons.slots(),
             light_count: inputs.lights.count(),
             row,
-            share: 0.0,
+            share: inputs.guiding.share(),
             kept: 0.0,
         };
         inputs
             .queue
             .write_buffer(&resources.count.params, 0, bytemuck::bytes_of(&params));
-        let [emission_counts, _] = inputs.tables.emission_counts();
-        let [reflection_counts, _] = inputs.tables.reflection_counts();
+        let [emission_counts, _] = inputs.guiding.tables.emission_counts();
+        let [reflection_counts, _] = inputs.guiding.tables.reflection_counts();
         let bound = [
             (&resources.count.params).into(),
             inputs.photons.buffer().into(),
@@ -213,11 +234,7 @@ impl PhotonGuiding {
             slot_count: 0,
             light_count: inputs.lights.count(),
             row: 0,
-            share: if inputs.share > 0.0 {
-                inputs.share.min(MOST_SHARE)
-            } else {
-                0.0
-            },
+            share: 0.0,
             kept: KEPT,
         };
         inputs

@@ -1,6 +1,7 @@
 //! The photon walk apart from what traces its rays: uniforms, bindings and dispatch that all tracers share.
 
 use super::dispatch_64;
+use super::photon_guiding::Guiding;
 use crate::Error;
 use crate::gpu::{self as device, BindGroupCache, Slot};
 use crate::resource::{GuidingTables, LostRays, Photons};
@@ -20,7 +21,7 @@ pub(crate) mod gpu {
         pub(crate) row: u32,
         pub(crate) is_shared: u32,
         pub(crate) map: u32,
-        pub(crate) is_guided: u32,
+        pub(crate) guided: f32,
     }
 }
 
@@ -64,7 +65,7 @@ pub(super) struct PhotonWalkInputs<'a> {
     pub(super) shared: Option<SharedHop<'a>>,
     pub(super) sample_offset: u32,
     pub(super) roulette_from: u32,
-    pub(super) guiding: Option<&'a GuidingTables>,
+    pub(super) guiding: Option<Guiding<'a>>,
 }
 
 /// The uniform of a walk, written, and group 0.
@@ -108,10 +109,12 @@ impl PhotonWalk {
             row,
             is_shared: u32::from(inputs.shared.is_some()),
             map: inputs.photons.map() as u32,
-            is_guided: u32::from(inputs.guiding.is_some()),
+            guided: inputs.guiding.map_or(0.0, |guiding| guiding.share()),
         };
         inputs.queue.write_buffer(buffer, 0, bytemuck::bytes_of(&params));
-        let tables = inputs.guiding.map_or(&resources.no_tables, GuidingTables::reflection);
+        let tables = inputs
+            .guiding
+            .map_or(&resources.no_tables, |guiding| guiding.tables.reflection());
         let bound = [buffer.into(), inputs.photons.buffer().into(), tables.into()];
         Some(PreparedWalk {
             params: buffer.clone(),

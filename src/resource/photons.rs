@@ -18,9 +18,9 @@ pub struct Photon {
     /// still to be traced; `position`, `normal` and `direction` are those of its start. Bit 11: the surface's back is hit. Bit 12: it
     /// came by way of metal and glass alone, in a [`PhotonMap::Global`]. Bit 13, beside bit 10: the light's rays are parallel. Bit 14, beside
     /// bit 8 or 10: the light is flat. Bits 16
-    /// to 31 are 0 where photons are spread evenly and after the path's end, else (see [`GuidingTables`](super::GuidingTables)) bits
-    /// 16 to 23 the cell that it started in, bits 24 to 31 b where photons come this way 2^((b − 128) / 16) times as densely as if
-    /// they were spread evenly. Others 0.
+    /// to 31 are 0 where no photons are guided and after the path's end, else (see [`GuidingTables`](super::GuidingTables)) bit 15
+    /// says whether this one is, bits 16 to 23 the cell that it started in, bits 24 to 31 b where those that are guided come this way 2^((b − 128) / 8) times as densely
+    /// as those that are spread evenly. Others 0.
     pub state: u32,
     /// Radiant flux that the hop carried, unit frame, before the surface takes its share.
     pub flux: [f32; 3],
@@ -63,8 +63,8 @@ impl Photon {
     /// Bit of `state` that marks a photon at its light, whose first hop is not traced yet.
     pub const STARTED: u32 = 1024;
 
-    pub(crate) const BOOST_ONE: f32 = 128.0;
-    pub(crate) const BOOST_STEPS: f32 = 16.0;
+    pub(crate) const GUIDANCE_ONE: f32 = 128.0;
+    pub(crate) const GUIDANCE_STEPS: f32 = 8.0;
 
     /// What became of this hop.
     pub fn state(&self) -> PhotonState {
@@ -120,12 +120,12 @@ impl Photon {
         (self.light_and_surface >> 16) as u16
     }
 
-    /// How many times as densely photons come this one's way as if they were spread evenly, within 2.2 % for each time that the path
-    /// was guided.
-    pub fn guided_boost(&self) -> f32 {
+    /// How many times as densely guided photons come this one's way as those that are spread evenly, in steps of an eighth of a
+    /// doubling; 1 where none are guided.
+    pub fn guidance(&self) -> f32 {
         match self.state >> 24 {
             0 => 1.0,
-            steps => ((steps as f32 - Self::BOOST_ONE) / Self::BOOST_STEPS).exp2(),
+            steps => ((steps as f32 - Self::GUIDANCE_ONE) / Self::GUIDANCE_STEPS).exp2(),
         }
     }
 

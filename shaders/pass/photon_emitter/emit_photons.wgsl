@@ -40,22 +40,32 @@ fn light_of(photon: u32) -> u32 {
 fn emit_photons(@builtin(global_invocation_id) id: vec3u) {
     let index = id.y * params.row + id.x;
     if id.x < params.row && index < params.photon_count {
-        emit_photon(index, EmissionStart(random_pair(params.sample_offset + index, 0u), 0u, 1.0), 0u);
+        emit_photon(index, random_pair(params.sample_offset + index, 0u), 1.0, 0u);
     }
 }
 
-// As the tables say.
+// The first of each light's, a share of them, as the tables say: both parts of the sequence are as evenly spread as the whole.
 @compute @workgroup_size(64)
 fn emit_photons_by_cells(@builtin(global_invocation_id) id: vec3u) {
     let index = id.y * params.row + id.x;
-    if id.x < params.row && index < params.photon_count {
-        let start = emission_start(light_of(index), random_pair(params.sample_offset + index, 0u));
-        emit_photon(index, start, photon_guided(start.cell, start.boost));
+    if id.x >= params.row || index >= params.photon_count {
+        return;
     }
+    let light = light_of(index);
+    let sequence_index = params.sample_offset + index;
+    let is_guided = f32(index - lights[light].first_photon) < params.guided * f32(lights[light].photon_count);
+    var u = random_pair(sequence_index, 0u);
+    if is_guided {
+        u = emission_place(light, u);
+    }
+    let cell = emission_cell_at(u);
+    let guiding = photon_guiding(is_guided, cell, emission_guidance(light, cell), random_guidance(sequence_index, 0u));
+    emit_photon(index, u, photon_boost(guiding, params.guided), guiding);
 }
 
-// `kept`: bits of the state that the path carries on.
-fn emit_photon(index: u32, start: EmissionStart, kept: u32) {
+// `boost`: how many times as many photons start this way as would if they were spread evenly; `kept`: bits of the state that the
+// path carries on.
+fn emit_photon(index: u32, u: vec2f, boost: f32, kept: u32) {
     let light_index = light_of(index);
     let light = lights[light_index];
     if index < light.first_photon || index >= light.first_photon + light.photon_count {
@@ -64,11 +74,11 @@ fn emit_photon(index: u32, start: EmissionStart, kept: u32) {
     }
     if starts_on_surface(light) {
         let place = surface_start(light, params.sample_offset + index, light.photon_count);
-        let direction = normalize(sampling_frame(place.normal) * sampling_cosine(start.u));
-        photons[index] = photon_started(place, light_index, direction, start.boost, kept);
+        let direction = normalize(sampling_frame(place.normal) * sampling_cosine(u));
+        photons[index] = photon_started(place, light_index, direction, boost, kept);
         return;
     }
     let within = light_within(light, params.sample_offset + index);
-    let emission = emit(within, start.u);
-    photons[index] = photon_on_ray(light_index, emission.ray, start.boost * emission.pdf, within.photon_flux / start.boost, kept);
+    let emission = emit(within, u);
+    photons[index] = photon_on_ray(light_index, emission.ray, boost * emission.pdf, within.photon_flux / boost, kept);
 }

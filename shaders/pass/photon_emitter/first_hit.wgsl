@@ -9,6 +9,8 @@ struct Params {
     row: u32,
     // 1: photons only set out
     traces_first: u32,
+    // Share of the photons that start as `emission_tables` say
+    guided: f32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;

@@ -43,7 +43,7 @@ fn tile_of(photon: Photon) -> u32 {
 
 // In how many parts of EVEN_PHOTON it counts: as many as it has flux.
 fn photon_count(photon: Photon) -> u32 {
-    return u32(max(1.0, round(EVEN_PHOTON / photon_boost(photon.state))));
+    return u32(max(1.0, round(EVEN_PHOTON / photon_boost(photon.state, params.share))));
 }
 
 fn slot_of(id: vec3u) -> u32 {

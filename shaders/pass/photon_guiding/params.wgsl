@@ -7,7 +7,7 @@ struct Params {
     light_count: u32,
     // Invocations in a row of the dispatch over all slots
     row: u32,
-    // Share of the photons that are guided, the others being spread evenly
+    // Share of the photons that are guided
     share: f32,
     // Of what was counted before, the part that is kept
     kept: f32,

@@ -27,7 +27,8 @@ fn update_emission(@builtin(workgroup_id) group: vec3u, @builtin(local_invocatio
         }
         workgroupBarrier();
     }
-    shares[cell] = counted.x + SEEN_BY_CHANCE * sums[0].x / max(sums[0].y, 1.0);
+    // Where nothing was seen, all cells are alike.
+    shares[cell] = counted.x + SEEN_BY_CHANCE * max(sums[0].x, 1.0) / max(sums[0].y, 1.0);
     workgroupBarrier();
     let column = cell / EMISSION_CELLS;
     let row = cell % EMISSION_CELLS;
@@ -43,20 +44,16 @@ fn update_emission(@builtin(workgroup_id) group: vec3u, @builtin(local_invocatio
     for (var i = 0u; i < EMISSION_CELLS; i++) {
         total += columns[i];
     }
-    // Where nothing was seen, all cells are alike.
-    let directed = select(0.0, params.share, total > 0.0);
-    let scale = directed / max(total, 1e-30);
-    let even = (1.0 - directed) / f32(EMISSION_CELLS);
-    var sum = 0.0;
+    var end = 0.0;
     for (var i = 0u; i <= row; i++) {
-        sum += scale * shares[column * EMISSION_CELLS + i] + even / f32(EMISSION_CELLS);
+        end += shares[column * EMISSION_CELLS + i];
     }
-    emission_tables[light].rows[cell] = sum / (scale * columns[column] + even);
+    emission_tables[light].rows[cell] = end / columns[column];
     if row == 0u {
-        var end = 0.0;
+        end = 0.0;
         for (var i = 0u; i <= column; i++) {
-            end += scale * columns[i] + even;
+            end += columns[i];
         }
-        emission_tables[light].columns[column] = end;
+        emission_tables[light].columns[column] = end / total;
     }
 }

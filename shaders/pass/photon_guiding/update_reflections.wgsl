@@ -21,14 +21,13 @@ fn update_reflections(@builtin(global_invocation_id) id: vec3u) {
     }
     // Where nothing was seen, all cells are alike.
     let by_chance = SEEN_BY_CHANCE * max(weight, 1.0) / max(history[at], 1.0);
-    let scale = params.share / (weight + by_chance * f32(REFLECTION_CELL_TOTAL));
-    let even = (1.0 - params.share) / f32(REFLECTION_CELL_TOTAL) + scale * by_chance;
+    let total = weight + by_chance * f32(REFLECTION_CELL_TOTAL);
     var end = 0.0;
     for (var column = 0u; column < REFLECTION_CELLS; column++) {
         let own = column * REFLECTION_CELLS;
         let before = end;
         for (var row = 0u; row < REFLECTION_CELLS; row++) {
-            end += scale * history[at + 1u + own + row] + even;
+            end += (history[at + 1u + own + row] + by_chance) / total;
             // Not yet a part of the column's share.
             reflection_tables[table].rows[own + row] = end - before;
         }

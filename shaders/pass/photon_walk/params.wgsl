@@ -14,8 +14,8 @@ struct WalkParams {
     is_shared: u32,
     // PHOTON_MAP_...
     map: u32,
-    // 1: paths go on as `reflection_tables` say
-    is_guided: u32,
+    // Share of the paths that go on as `reflection_tables` say
+    guided: f32,
 }
 
 // What is kept of paths: all of them; all, but what comes to a diffuse surface by way of specular ones alone is marked as the

@@ -44,7 +44,7 @@ fn spread_from_point(density: f32) -> Spread {
 // What a hop arrives as that left `origin` in this direction.
 fn arrived(origin: Photon, flux: vec3f, direction: vec3f, spread: Spread, hit: Hit) -> Photon {
     let light = photon_light(origin.light_and_surface) | photon_lobe_light(hit.lobe);
-    let kept = origin.state & PHOTON_GUIDED;
+    let kept = origin.state & PHOTON_GUIDING;
     if hit.kind != HIT_SURFACE && hit.kind != HIT_TENTATIVE {
         let fate = select(PHOTON_LOST, PHOTON_ESCAPED, hit.kind == HIT_ESCAPED);
         return photon_gone(fate | kept, flux, direction, light);
@@ -105,18 +105,25 @@ fn next_specular(photon: Photon, flux: vec3f, scattering: Scattering) -> Photon 
 // One hop from a stored photon.
 fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) -> Photon {
     let normal = octahedral_unpack(photon.normal);
-    var start = ReflectionStart(random_pair(sequence_index, 2u * bounce), 1.0);
+    var u = random_pair(sequence_index, 2u * bounce);
+    var boost = 1.0;
     var origin = photon;
-    if walk.is_guided == 1u {
-        start = reflection_start(reflection_table(photon.position, normal), start.u);
-        let guided = photon_guided(photon_cell(photon.state), photon_boost(photon.state) * start.boost);
-        origin.state = (photon.state & ~PHOTON_GUIDED) | guided;
+    if walk.guided > 0.0 {
+        let table = reflection_table(photon.position, normal);
+        let is_guided = (photon.state & PHOTON_IS_GUIDED) != 0u;
+        if is_guided {
+            u = reflection_place(table, u);
+        }
+        let guidance = photon_guidance(photon.state) * reflection_guidance(table, reflection_cell_at(u));
+        let chance = random_guidance(sequence_index, bounce);
+        let guiding = photon_guiding(is_guided, photon_cell(photon.state), guidance, chance);
+        origin.state = (photon.state & ~PHOTON_GUIDING) | guiding;
+        boost = photon_boost(origin.state, walk.guided) / photon_boost(photon.state, walk.guided);
     }
-    let local = sampling_cosine(start.u);
+    let local = sampling_cosine(u);
     let direction = normalize(sampling_frame(normal) * local);
     let hit = trace_ray(photon.position, normal, direction);
-    let spread = spread_from_point(start.boost * WALK_INVERSE_PI * local.z);
-    return arrived(origin, flux / start.boost, direction, spread, hit);
+    return arrived(origin, flux / boost, direction, spread_from_point(boost * WALK_INVERSE_PI * local.z), hit);
 }
 
 // The first hop of a photon that stands at its light.
