@@ -15,15 +15,17 @@ use clap::{Parser, ValueEnum};
 use common::adapter::{Gpu, Wishes};
 use common::clock::{Clock, median};
 use common::offline::{Component, Offline, wait};
+use common::reference::Reference;
 use common::{arguments, gltf_scene, truth_file};
-use lightfall::frame::{Settings, TracerKind, Upsampling};
+use lightfall::frame::{GlossyMethod, Settings, TracerKind, Upsampling};
 use lightfall::pass::{
     Bandwidth, BoundaryCorrection, MarkedSplatInputs, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources,
     SplatShape, Upsampler, UpsamplerInputs, UpsamplerResources,
 };
 use lightfall::reference::metrics::{self, Comparison, Image, Truth};
+use lightfall::reference::{PathComponent, PathTracerSettings};
 use lightfall::resource::{Irradiance, MarkedPixels, Subsampling};
-use lightfall::scene::{Scene, SceneSummary};
+use lightfall::scene::{Material, Scene, SceneSummary};
 use lightfall::wgpu;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -40,6 +42,8 @@ enum Table {
     Upsampling,
     /// Sixteen-bit sums against f32
     Blending,
+    /// The scene's floor with a Phong lobe: radii that are fixed against such that vary
+    Glossy,
 }
 
 /// Prints tables about density estimation.
@@ -50,7 +54,7 @@ struct Arguments {
     /// Its indirect light, .exr
     truth: PathBuf,
     /// Which tables
-    #[arg(long, value_delimiter = ',', default_values = ["shapes", "photons", "frames", "upsampling", "blending"])]
+    #[arg(long, value_delimiter = ',', default_values = ["shapes", "photons", "frames", "upsampling", "blending", "glossy"])]
     tables: Vec<Table>,
     /// Pixels along an axis, multiples of the reference's
     #[arg(long, value_delimiter = ',', default_values_t = [256, 512, 1024])]
@@ -116,6 +120,7 @@ impl<'a> Study<'a> {
                 Table::Frames => self.frames()?,
                 Table::Upsampling => self.upsampling()?,
                 Table::Blending => self.blending()?,
+                Table::Glossy => self.glossy()?,
             }
             println!();
         }
@@ -277,6 +282,85 @@ impl<'a> Study<'a> {
                 light / total,
                 100.0 * (squares / count).sqrt() / (total / count)
             );
+        }
+        Ok(())
+    }
+
+    /// Yao et al. 2010, section 6: photons on a floor of exponent 100, seen at full resolution, against paths of the eye.
+    fn glossy(&self) -> Result<(), String> {
+        const SIZE: u32 = 128;
+        const SAMPLES: u32 = 1024;
+        let mut scene = self.scene.clone();
+        let floor = scene.instances.iter().position(|i| i.name == "floor");
+        let floor = floor.ok_or("the scene has nothing that is named floor")?;
+        scene.instances[floor].material = scene.materials.len();
+        scene.materials.push(Material {
+            metallic: 1.0,
+            phong_exponent: Some(100.0),
+            ..Material::diffuse("Phong", [0.7; 3])
+        });
+        let paths = PathTracerSettings {
+            component: PathComponent::Specular,
+            bounces: self.arguments.bounces,
+            ..Default::default()
+        };
+        let text = |e: lightfall::Error| e.to_string();
+        let mut reference = Reference::new(&self.gpu, scene.clone(), &paths, 0, [SIZE; 2]).map_err(text)?;
+        for _ in 0..SAMPLES {
+            reference.render_sample(None).map_err(text)?;
+        }
+        let estimate = reference.read().map_err(text)?;
+        let truth = Truth {
+            valid: estimate.mean.iter().map(|p| p.iter().any(|&v| v > 0.0)).collect(),
+            standard_error: Some(estimate.standard_error),
+            ..Truth::new(Image {
+                width: SIZE,
+                height: SIZE,
+                rgb: estimate.mean,
+            })
+        };
+        let mean: f64 = truth.image.rgb.iter().flatten().map(|&v| f64::from(v)).sum();
+        let mean = mean / (3 * truth.valid.iter().filter(|valid| **valid).count()) as f64;
+        println!("| photons | radius | frame | RMSE over mean | bias |\n|---|---|---|---|---|");
+        for photons in [100_000, 400_000] {
+            let fixed = [0.02, 0.04, 0.08, 0.16].map(|radius| (format!("fixed, {radius}"), Bandwidth::Fixed(radius)));
+            let by_hop = [
+                (100.0, 1.0),
+                (100.0, 4.0),
+                (100.0, 16.0),
+                (400.0, 1.0),
+                (400.0, 4.0),
+                (400.0, 16.0),
+            ];
+            let by_hop = by_hop.map(|(photons, highest)| {
+                let clamp = [1.0 / highest, highest];
+                let name = format!("by hop, k = {photons}, p̂ from 1/{highest} to {highest}");
+                (name, Bandwidth::Density { photons, clamp })
+            });
+            for (name, bandwidth) in fixed.into_iter().chain(by_hop) {
+                let mut settings = self.settings(photons, 0.0);
+                settings.glossy_method = GlossyMethod::Photons;
+                settings.splatter.bandwidth = bandwidth;
+                let mut offline = Offline::new(&self.gpu, scene.clone(), &settings, 0, [SIZE; 2], Component::Specular)
+                    .map_err(text)?;
+                let mut clock = Clock::new(&self.gpu);
+                for _ in 0..4 {
+                    clock.frame(&self.gpu, &mut offline)?;
+                }
+                let rgb = offline.read().map_err(text)?;
+                let image = Image {
+                    width: SIZE,
+                    height: SIZE,
+                    rgb,
+                };
+                let error = metrics::compare(&image, &truth).map_err(text)?;
+                println!(
+                    "| {photons} | {name} | {:.0} ms | {:.3} | {:+.1} % |",
+                    clock.frame_ms()[0],
+                    error.rmse / mean,
+                    100.0 * error.bias
+                );
+            }
         }
         Ok(())
     }

@@ -108,7 +108,7 @@ impl<'a> Bench<'a> {
         let picked = (0..count).map_while(|i| stored.get((i as f64 * stride) as usize));
         Ok(picked
             .map(|photon| {
-                let normal = super::judge::unpack(photon.normal);
+                let normal = Photon::unpack_unit_vector(photon.normal);
                 // The sum of a normal and a point of the unit sphere is distributed by the cosine.
                 let direction = (normal.as_dvec3() + random.direction()).normalize().as_vec3();
                 SurfaceRay::new(photon.position.into(), normal, direction)
@@ -121,7 +121,7 @@ impl<'a> Bench<'a> {
         let list: Vec<_> = rays
             .iter()
             .map(|ray| Ray {
-                origin: (Vec3::from(ray.position) + OFFSET * super::judge::unpack(ray.normal)).to_array(),
+                origin: (Vec3::from(ray.position) + OFFSET * Photon::unpack_unit_vector(ray.normal)).to_array(),
                 furthest: Ray::FURTHEST,
                 direction: ray.direction,
                 mask: Ray::IN_ENV_MAPS,

@@ -1,12 +1,12 @@
 //! How evenly the work is spread over invocations that run together, and what would spread it better.
 
 use super::bench::Bench;
-use super::judge::{Truth, judge, unpack};
+use super::judge::{Truth, judge};
 use super::selection::Selector;
 use lightfall::Error;
 use lightfall::glam::Vec3;
 use lightfall::pass::{ImageSpaceTracer, ImageSpaceTracerSettings, TraceMethod};
-use lightfall::resource::{SurfaceHit, SurfaceRay};
+use lightfall::resource::{Photon, SurfaceHit, SurfaceRay};
 
 /// Invocations that run together on usual GPUs.
 const GROUP: usize = 32;
@@ -48,7 +48,7 @@ pub(crate) fn table(
         axis(0) | axis(1) << 4 | axis(2) << 8
     };
     let facing = |ray: &SurfaceRay| {
-        let n = unpack(ray.normal);
+        let n = Photon::unpack_unit_vector(ray.normal);
         n.abs().max_position() * 2 + usize::from(n[n.abs().max_position()] < 0.0)
     };
     let orders: [Order<'_>; 4] = [

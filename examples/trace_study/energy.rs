@@ -1,7 +1,7 @@
 //! How much light the photon walk loses or puts in the wrong place, hop by hop.
 
 use super::bench::{BOUNCES, Bench};
-use super::judge::{agrees, unpack};
+use super::judge::agrees;
 use super::selection::Selector;
 use lightfall::Error;
 use lightfall::frame::{Settings, TracerKind};
@@ -100,7 +100,7 @@ fn misplaced(bench: &Bench<'_>, from: &[Photon], to: &[Photon]) -> Result<f64, E
         let position = Vec3::from(from.position);
         SurfaceRay::new(
             position,
-            unpack(from.normal),
+            Photon::unpack_unit_vector(from.normal),
             (Vec3::from(to.position) - position).normalize_or(Vec3::Y),
         )
     };
@@ -110,7 +110,7 @@ fn misplaced(bench: &Bench<'_>, from: &[Photon], to: &[Photon]) -> Result<f64, E
         let distance = (Vec3::from(pair.1.position) - Vec3::from(ray.position)).length();
         truth
             .as_ref()
-            .is_none_or(|t| !agrees(t, distance, unpack(pair.1.normal), bench.diagonal)[1])
+            .is_none_or(|t| !agrees(t, distance, Photon::unpack_unit_vector(pair.1.normal), bench.diagonal)[1])
     });
     let wrong: f64 = wrong.map(|((pair, _), _)| flux(pair.1)).sum();
     Ok(wrong / stored(to).max(f64::MIN_POSITIVE))
