@@ -42,7 +42,7 @@ enum Table {
     Upsampling,
     /// Sixteen-bit sums against f32
     Blending,
-    /// The scene's floor with a Phong lobe: radii that are fixed against such that vary
+    /// A scene's floor, if one is named so, with a Phong lobe: radii that are fixed against such that vary
     Glossy,
 }
 
@@ -54,7 +54,7 @@ struct Arguments {
     /// Its indirect light, .exr
     truth: PathBuf,
     /// Which tables
-    #[arg(long, value_delimiter = ',', default_values = ["shapes", "photons", "frames", "upsampling", "blending", "glossy"])]
+    #[arg(long, value_delimiter = ',', default_values = ["shapes", "photons", "frames", "upsampling", "blending"])]
     tables: Vec<Table>,
     /// Pixels along an axis, multiples of the reference's
     #[arg(long, value_delimiter = ',', default_values_t = [256, 512, 1024])]

@@ -355,9 +355,10 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::ENV_MAP_SELECTOR, "Selection", env_map_selector::gpu::SelectionRecord {
             tag, selected, newest, is_done, is_stable, swaps, coverage, total, chosen,
         }),
-        twin!(wgsl::PHOTON_GUIDING_COUNT, "Params", photon_guiding::gpu::Params {
-            path_count, slot_count, light_count, row, share, kept,
+        twin!(wgsl::PHOTON_GUIDING_COUNT, "CountParams", photon_guiding::gpu::CountParams {
+            path_count, slot_count, light_count, row,
         }),
+        twin!(wgsl::PHOTON_GUIDING_EMISSION, "UpdateParams", photon_guiding::gpu::UpdateParams { kept }),
         twin!(wgsl::PHOTON_EMITTER_AT_TARGETS, "PhotonTargets", photon_targets::gpu::PhotonTargets {
             balls, ranges, ball_count, _pad,
         }),
@@ -734,6 +735,7 @@ fn photon_states_are_the_same_on_both_sides() {
         ("EMISSION_CELLS", guiding_tables::CELLS),
         ("EMISSION_COUNTS", guiding_tables::EMISSION_COUNTS),
         ("REFLECTION_CELLS", guiding_tables::REFLECTIONS),
+        ("REFLECTION_COUNTS", guiding_tables::REFLECTION_COUNTS),
         ("REFLECTION_PLACES", guiding_tables::PLACES),
         ("TILES", photon_guiding::TILES as usize),
     ] {

@@ -72,10 +72,11 @@ pub(crate) const PHOTON_EMITTER_AT_TARGETS: &str = compose![
 
 pub(crate) const PHOTON_GUIDING_COUNT: &str = compose![
     "pass/photon_guiding/count_visible.wgsl",
-    "pass/photon_guiding/params.wgsl",
+    "pass/photon_guiding/count_params.wgsl",
     "common/emission_grid.wgsl",
-    "common/reflection_tables.wgsl",
+    "common/reflection_grid.wgsl",
     "common/sampling.wgsl",
+    "common/hash.wgsl",
     "common/photon.wgsl",
     "common/lobe.wgsl",
     "common/g_buffer.wgsl",
@@ -84,17 +85,16 @@ pub(crate) const PHOTON_GUIDING_COUNT: &str = compose![
 
 pub(crate) const PHOTON_GUIDING_EMISSION: &str = compose![
     "pass/photon_guiding/update_emission.wgsl",
-    "pass/photon_guiding/params.wgsl",
+    "pass/photon_guiding/update_params.wgsl",
     "common/emission_tables.wgsl",
     "common/emission_grid.wgsl",
-    "common/reflection_tables.wgsl",
-    "common/sampling.wgsl",
 ];
 
 pub(crate) const PHOTON_GUIDING_REFLECTIONS: &str = compose![
     "pass/photon_guiding/update_reflections.wgsl",
-    "pass/photon_guiding/params.wgsl",
+    "pass/photon_guiding/update_params.wgsl",
     "common/reflection_tables.wgsl",
+    "common/reflection_grid.wgsl",
     "common/sampling.wgsl",
 ];
 
@@ -139,7 +139,7 @@ pub(crate) const IMAGE_SPACE_TRACER: &str = compose![
     "pass/photon_walk/walk_photons.wgsl",
     "pass/photon_walk/params.wgsl",
     "common/reflection_tables.wgsl",
-    "common/reflection_start.wgsl",
+    "common/reflection_grid.wgsl",
     "common/depth_range.wgsl",
     "common/env_map.wgsl",
     "common/hit.wgsl",
@@ -174,7 +174,7 @@ pub(crate) const BVH_TRACER: &str = compose![
     "pass/photon_walk/walk_photons.wgsl",
     "pass/photon_walk/params.wgsl",
     "common/reflection_tables.wgsl",
-    "common/reflection_start.wgsl",
+    "common/reflection_grid.wgsl",
     "common/bvh.wgsl",
     "common/bvh_surface.wgsl",
     "common/hit.wgsl",

@@ -6,8 +6,9 @@ mod common;
 use common::{Component, Gpu, Offline, assert_no_errors, gpu};
 use lightfall::frame::{Settings, TracerKind};
 use lightfall::glam::{DVec3, Vec3};
+use lightfall::pass::FirstHits;
 use lightfall::resource::{Photon, PhotonState};
-use lightfall::scene::{Light, Scene, samples};
+use lightfall::scene::{Light, LightKind, Scene, samples};
 use lightfall::{Error, wgpu};
 use std::collections::BTreeSet;
 
@@ -75,6 +76,11 @@ fn shares<const N: usize>(gpu: &Gpu, tables: &wgpu::Buffer) -> Vec<Vec<f64>> {
 /// For each light: share of its photons by cell of its emission.
 fn emission_shares(gpu: &Gpu, offline: &Offline<'_>) -> Vec<Vec<f64>> {
     shares::<CELLS>(gpu, offline.renderer.guiding_tables().unwrap().emission())
+}
+
+/// For each table of reflections: share of the photons that it is for, by cell.
+fn reflection_shares(gpu: &Gpu, offline: &Offline<'_>) -> Vec<Vec<f64>> {
+    shares::<REFLECTIONS>(gpu, offline.renderer.guiding_tables().unwrap().reflection())
 }
 
 /// The table of reflections of a place and a normal, and the cell of a direction from there; `None` where rounding may decide.
@@ -171,9 +177,9 @@ fn photons_start_as_densely_as_the_table_says_and_bring_as_much_light() {
 fn photons_go_on_as_densely_as_the_tables_say() {
     let Some(gpu) = gpu() else { return };
     let guided = rendered(&gpu, &doorway(), &settings(SHARE));
-    let tables = shares::<REFLECTIONS>(&gpu, guided.renderer.guiding_tables().unwrap().reflection());
+    let tables = reflection_shares(&gpu, &guided);
     let all = photons(&gpu, &guided);
-    let count = settings(0.8).photons as usize;
+    let count = settings(SHARE).photons as usize;
     let (mut checked, mut most) = (0, 0.0f64);
     for (from, to) in all.iter().zip(&all[count..]) {
         let way = || reflection(from, Photon::unpack_unit_vector(to.direction));
@@ -181,7 +187,9 @@ fn photons_go_on_as_densely_as_the_tables_say() {
             continue;
         }
         let Some((table, cell)) = way() else { continue };
-        let guidance = 16.0 * tables[table][cell];
+        // Paths whose guidance eight bits may not hold much longer go on evenly.
+        let is_guided = (2f32.powi(-12)..2f32.powi(11)).contains(&from.guidance());
+        let guidance = if is_guided { 16.0 * tables[table][cell] } else { 1.0 };
         assert!(is_rounded(to.guidance(), f64::from(from.guidance()) * guidance));
         let flux = f64::from(from.flux[1] * from.reflectance()[1]) * boost(from) / boost(to);
         assert!(
@@ -196,6 +204,53 @@ fn photons_go_on_as_densely_as_the_tables_say() {
         3 * count
     );
     assert!(checked > 2 * count && most > 4.0);
+    assert_no_errors(&gpu);
+}
+
+/// Walks that two tracers share, photons that start on a panel, and such as come by way of metal and glass.
+#[test]
+fn guided_photons_bring_as_much_light_however_they_are_traced() {
+    let Some(gpu) = gpu() else { return };
+    let panel = || {
+        let mut scene = doorway();
+        scene.lights = vec![Light {
+            kind: LightKind::Rectangle {
+                center: DVec3::new(-0.8, 2.4, -2.2),
+                half_u: DVec3::new(0.3, 0.0, 0.0),
+                half_v: DVec3::new(0.0, 0.0, 0.3),
+            },
+            ..Light::point(DVec3::ZERO, 20.0, [1.0, 0.9, 0.75])
+        }];
+        scene
+    };
+    let glass = samples::glass_sphere(0.0);
+    // Of the glass fresh paths: where little light is stored, tables fit paths that stay the same too well.
+    for (name, scene, tracer_kind, first_hits, frames) in [
+        ("hybrid", doorway(), TracerKind::Hybrid, FirstHits::ShadowMaps, 1),
+        ("panel", panel(), TracerKind::Hybrid, FirstHits::Traced, 1),
+        ("glass", glass, TracerKind::Bvh, FirstHits::Traced, 12),
+    ] {
+        let flux = |guided| {
+            let settings = Settings {
+                tracer_kind,
+                first_hits,
+                frames,
+                ..settings(guided)
+            };
+            let offline = rendered(&gpu, &scene, &settings);
+            let count = settings.photons as usize;
+            let all = photons(&gpu, &offline);
+            let by_hop = all.chunks_exact(count).map(|hop| {
+                let stored = hop.iter().filter(|p| p.state() == PhotonState::Stored);
+                stored.map(|p| f64::from(p.flux[1])).sum::<f64>()
+            });
+            by_hop.collect::<Vec<_>>()
+        };
+        let ratios: Vec<f64> = flux(SHARE).iter().zip(flux(0.0)).map(|(a, b)| a / b - 1.0).collect();
+        println!("{name}: {ratios:.4?} of each hop's flux");
+        assert_eq!(ratios.len(), 4);
+        assert!(ratios.iter().all(|ratio| ratio.abs() < 0.04), "{name}: {ratios:?}");
+    }
     assert_no_errors(&gpu);
 }
 
@@ -217,7 +272,7 @@ fn more_photons_come_through_a_doorway() {
     };
     let [even, guided] = [worth(0.0), worth(0.5)];
     println!("{even:.0} spread evenly, {guided:.0} guided");
-    assert!(guided > 1.5 * even);
+    assert!(guided > 1.3 * even);
     assert_no_errors(&gpu);
 }
 
@@ -225,17 +280,19 @@ fn more_photons_come_through_a_doorway() {
 fn a_scene_at_rest_comes_to_the_same_bits() {
     let Some(gpu) = gpu() else { return };
     let scene = doorway();
-    let mut offline = Offline::new(&gpu, scene.clone(), &settings(0.8), 0, SIZE, Component::Indirect).unwrap();
+    let mut offline = Offline::new(&gpu, scene.clone(), &settings(SHARE), 0, SIZE, Component::Indirect).unwrap();
     offline.in_motion = false;
     for _ in 0..10 {
         offline.render_frame(None).unwrap();
     }
     let table = emission_shares(&gpu, &offline);
+    let reflections = reflection_shares(&gpu, &offline);
     let image = offline.read().unwrap();
     offline.render_frame(None).unwrap();
     assert!(image.iter().flatten().any(|&v| v > 0.0));
     assert!(offline.read().unwrap() == image);
     assert_eq!(emission_shares(&gpu, &offline), table);
+    assert_eq!(reflection_shares(&gpu, &offline), reflections);
     assert_no_errors(&gpu);
 }
 

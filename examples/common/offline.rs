@@ -94,7 +94,7 @@ impl<'a> Offline<'a> {
             size,
             composite,
         };
-        // Where photons start depends on what was seen of those before: a frame in motion has others before it.
+        // Where photons go depends on what was seen of those before: a frame in motion has others before it.
         if settings.guided_photons > 0.0 && offline.in_motion {
             for _ in 0..WARM_UP {
                 offline.render_frame(None)?;

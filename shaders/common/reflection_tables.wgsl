@@ -1,12 +1,5 @@
-// Where paths go on to from diffuse surfaces: the square of the two random numbers that a scattered direction is made of, in cells,
-// for each place of a grid over the unit frame and each of the six directions of the axes that a normal may be nearest to.
-
-// Cells along each axis. Twin of `REFLECTIONS`.
-const REFLECTION_CELLS: u32 = 4u;
-const REFLECTION_CELL_TOTAL: u32 = REFLECTION_CELLS * REFLECTION_CELLS;
-// Places along each axis. Twin of `PLACES`.
-const REFLECTION_PLACES: u32 = 16u;
-const REFLECTION_TABLES: u32 = 6u * REFLECTION_PLACES * REFLECTION_PLACES * REFLECTION_PLACES;
+// Where paths go on to from diffuse surfaces: for each table the share of them that goes by each cell. The file that uses it binds
+// `reflection_tables`.
 
 struct ReflectionTable {
     // Sums of shares up to the end of each column of cells
@@ -15,25 +8,46 @@ struct ReflectionTable {
     rows: array<f32, REFLECTION_CELL_TOTAL>,
 }
 
-// The table of a place and a normal.
-fn reflection_table(position: vec3f, normal: vec3f) -> u32 {
-    let most = f32(REFLECTION_PLACES) - 1.0;
-    let at = vec3u(clamp((0.5 * position + 0.5) * f32(REFLECTION_PLACES), vec3f(0.0), vec3f(most)));
-    let place = at.x + REFLECTION_PLACES * (at.y + REFLECTION_PLACES * at.z);
-    let size = abs(normal);
-    let is_y = size.y > size.x && size.y >= size.z;
-    let is_z = size.z > size.x && size.z > size.y;
-    let axis = select(select(0u, 1u, is_y), 2u, is_z);
-    return 6u * place + 2u * axis + u32(normal[axis] < 0.0);
+// Takes an evenly spread pair of numbers to one that is spread as a table says. Neighbours stay neighbours.
+fn reflection_place(table: u32, u: vec2f) -> vec2f {
+    var column = 0u;
+    while column + 1u < REFLECTION_CELLS && u.x >= reflection_tables[table].columns[column] {
+        column++;
+    }
+    let first = column * REFLECTION_CELLS;
+    var row = 0u;
+    while row + 1u < REFLECTION_CELLS && u.y >= reflection_tables[table].rows[first + row] {
+        row++;
+    }
+    let before = reflection_before(table, column, row);
+    let share = reflection_share(table, column, row);
+    let within = clamp((u - before) / share, vec2f(0.0), vec2f(REFLECTION_BELOW_ONE));
+    return (vec2f(f32(column), f32(row)) + within) / f32(REFLECTION_CELLS);
 }
 
-// The cell of a pair of numbers.
-fn reflection_cell_at(u: vec2f) -> u32 {
-    let at = min(vec2u(u * f32(REFLECTION_CELLS)), vec2u(REFLECTION_CELLS - 1u));
-    return at.x * REFLECTION_CELLS + at.y;
+// How many times as densely a table places pairs in a cell as if they were spread evenly.
+fn reflection_guidance(table: u32, cell: u32) -> f32 {
+    let share = reflection_share(table, cell / REFLECTION_CELLS, cell % REFLECTION_CELLS);
+    return f32(REFLECTION_CELLS * REFLECTION_CELLS) * share.x * share.y;
 }
 
-// The cell of a direction about a normal.
-fn reflection_cell(normal: vec3f, direction: vec3f) -> u32 {
-    return reflection_cell_at(sampling_cosine_inverse(direction * sampling_frame(normal)));
+// Sums of shares up to the column and to the row.
+fn reflection_before(table: u32, column: u32, row: u32) -> vec2f {
+    var before = vec2f(0.0);
+    if column > 0u {
+        before.x = reflection_tables[table].columns[column - 1u];
+    }
+    if row > 0u {
+        before.y = reflection_tables[table].rows[column * REFLECTION_CELLS + row - 1u];
+    }
+    return before;
 }
+
+// Share of the column, and of the row in it.
+fn reflection_share(table: u32, column: u32, row: u32) -> vec2f {
+    let ends = vec2f(reflection_tables[table].columns[column], reflection_tables[table].rows[column * REFLECTION_CELLS + row]);
+    return ends - reflection_before(table, column, row);
+}
+
+// A little below 1: no sum with a column's number is rounded up.
+const REFLECTION_BELOW_ONE: f32 = 1.0 - 0x1p-18;

@@ -8,8 +8,8 @@ use crate::pass::BvhTracer;
 use crate::pass::{
     Bandwidth, DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EnvMapCapture,
     EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources,
-    EnvMapLightingSettings, FirstHits, Guiding, GuidingUpdateInputs, ImageSpaceTracer, PhotonEmitter, PhotonGrid,
-    PhotonGridInputs, PhotonGridResources, PhotonGuiding, PhotonGuidingResources, PhotonSpread, SortedPhotons,
+    EnvMapLightingSettings, FirstHits, Guiding, GuidingUpdateInputs, GuidingUpdateResources, ImageSpaceTracer,
+    PhotonEmitter, PhotonGrid, PhotonGridInputs, PhotonGridResources, PhotonGuiding, PhotonSpread, SortedPhotons,
 };
 use crate::resource::{
     CaptureView, DepthHierarchy, EnvMapIrradiance, EnvMaps, GuidingTables, Lights, PhotonMap, PhotonTargets, Photons,
@@ -41,8 +41,8 @@ pub(super) struct PhotonPasses {
 #[derive(Debug)]
 pub(super) struct IndirectScene {
     global: TracedPhotons,
-    /// If photons start where they count.
-    guiding: Option<(GuidingTables, PhotonGuidingResources)>,
+    /// If photons are guided.
+    guiding: Option<(GuidingTables, GuidingUpdateResources)>,
     image_space: Option<ImageSpaceScene>,
     /// While caustics have photons of their own, and what these are aimed at.
     caustics: Option<(TracedPhotons, PhotonTargets)>,
@@ -140,7 +140,7 @@ impl IndirectScene {
         };
         let guiding = || {
             let tables = GuidingTables::new(device, queue)?;
-            Ok((tables, PhotonGuidingResources::new(device)?))
+            Ok((tables, GuidingUpdateResources::new(device)?))
         };
         Ok(Self {
             guiding: (settings.guided_photons > 0.0).then(guiding).transpose()?,
@@ -234,7 +234,7 @@ impl IndirectScene {
     }
 
     pub(super) fn guiding_tables(&self) -> Option<&GuidingTables> {
-        self.guiding.as_ref().map(|e| &e.0)
+        self.guiding.as_ref().map(|g| &g.0)
     }
 
     pub(super) fn depth_hierarchy(&self) -> Option<&DepthHierarchy> {
@@ -282,7 +282,6 @@ impl IndirectScene {
         {
             let update_inputs = GuidingUpdateInputs {
                 queue: scene.queue,
-                lights: inputs.lights,
                 tables,
                 timestamps: scene.timestamps,
             };

@@ -6,7 +6,7 @@ use crate::Error;
 #[cfg(feature = "bvh")]
 use crate::pass::{BvhTracerResources, BvhTracerSurfaceRayInputs};
 use crate::pass::{
-    FinalGather, FinalGatherInputs, FinalGatherResources, GlossyLight, Guiding, ImageSpaceTracerRayInputs,
+    FinalGather, FinalGatherInputs, FinalGatherResources, GlossyLight, ImageSpaceTracerRayInputs,
     ImageSpaceTracerResources, IrradianceFilter, IrradianceFilterInputs, IrradianceFilterResources,
     IrradianceFilterSettings, MarkedSplatInputs, PhotonGuidingInputs, PhotonGuidingResources, PhotonSplatter,
     PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings, SpecularPaths, SplatShape, Upsampler,
@@ -34,7 +34,7 @@ pub(super) struct ViewPasses {
 pub(super) struct IndirectView {
     estimate: Estimate,
     estimated: Irradiance,
-    /// If photons start where they count.
+    /// If photons are guided.
     guiding: Option<PhotonGuidingResources>,
     /// From coarse to fine, while fewer pixels are estimated than seen.
     levels: Vec<UpsampledLevel>,
@@ -92,7 +92,7 @@ pub(super) struct IndirectViewInputs<'a> {
     pub(super) radius: f32,
     /// Of the photons.
     pub(super) sample_offset: u32,
-    /// Whether what is seen of photons counts for where the next ones start.
+    /// Whether what is seen of photons guides the next ones.
     pub(super) counts_guiding: bool,
 }
 
@@ -222,10 +222,7 @@ impl IndirectView {
                 photons: inputs.scene.photons(),
                 lights: inputs.lights,
                 g_buffer: inputs.g_buffer,
-                guiding: Guiding {
-                    tables,
-                    share: inputs.settings.guided_photons,
-                },
+                tables,
                 timestamps: inputs.view.timestamps,
             };
             pass.record(encoder, own, &guiding_inputs);

@@ -131,8 +131,8 @@ pub struct Settings {
     pub photons: u32,
     /// Share of the photons, from 0 and below 1, that go in those directions, from their light and from diffuse surfaces, whose paths
     /// were seen in the frames before; the others are spread evenly. Pays where much of the light never comes before the eye, as
-    /// through a doorway or of a sun over a building; costs two looks at each photon, and noise while things move. 0.5 is a good
-    /// start (`docs/density.md`).
+    /// through a doorway or of a sun over a building; costs two looks at each photon, noise while things move, and, where frames
+    /// are not accumulated, one to two hundredths of the light. 0.5 is a good start (`docs/density.md`).
     pub guided_photons: f32,
     /// How photons find where they first land. Shadow maps are faster, and curved mirrors in them a little flattened. Those of
     /// caustics are traced wherever there are triangles, which then trace all of their hops.

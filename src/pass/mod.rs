@@ -62,7 +62,9 @@ pub use irradiance_filter::{
 pub use nearest_occluder::{NearestOccluder, NearestOccluderInputs, NearestOccluderResources};
 pub use photon_emitter::{FirstHits, PhotonEmitter, PhotonEmitterInputs, PhotonEmitterResources, PhotonSpread};
 pub use photon_grid::{PhotonGrid, PhotonGridInputs, PhotonGridResources, SortedPhotons};
-pub use photon_guiding::{Guiding, GuidingUpdateInputs, PhotonGuiding, PhotonGuidingInputs, PhotonGuidingResources};
+pub use photon_guiding::{
+    Guiding, GuidingUpdateInputs, GuidingUpdateResources, PhotonGuiding, PhotonGuidingInputs, PhotonGuidingResources,
+};
 pub(crate) use photon_splatter::LARGEST_RADIUS;
 pub use photon_splatter::{
     Bandwidth, BoundaryCorrection, Kernel, MarkedSplatInputs, PhotonSplatter, PhotonSplatterConfig,

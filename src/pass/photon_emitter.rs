@@ -39,10 +39,10 @@ pub(crate) const SLOTS: [Slot; 5] = [
     Slot::Storage,
 ];
 
-/// Bindings of group 1 of `emit_photons_by_cells`, and of `emit_photons_at_targets`.
+/// Bindings of group 1 of `emit_guided_photons`, and of `emit_photons_at_targets`.
 pub(crate) const SPREAD_SLOTS: [Slot; 1] = [Slot::Storage];
 
-/// Where photons start and in which directions.
+/// Where photons start and in which directions they leave.
 #[derive(Debug, Clone, Copy)]
 pub enum PhotonSpread<'a> {
     /// As the lights shine.
@@ -82,7 +82,7 @@ pub struct PhotonEmitter {
     /// Of what spreads them.
     spread_layout: wgpu::BindGroupLayout,
     emit: wgpu::ComputePipeline,
-    emit_by_cells: wgpu::ComputePipeline,
+    emit_guided: wgpu::ComputePipeline,
     emit_at_targets: wgpu::ComputePipeline,
 }
 
@@ -139,10 +139,10 @@ impl PhotonEmitter {
                 "emit_photons",
                 &[&layout],
             ),
-            emit_by_cells: pipeline(
-                "lightfall::PhotonEmitter::emit_by_cells",
+            emit_guided: pipeline(
+                "lightfall::PhotonEmitter::emit_guided",
                 wgsl::PHOTON_EMITTER,
-                "emit_photons_by_cells",
+                "emit_guided_photons",
                 &[&layout, &spread_layout],
             ),
             emit_at_targets: pipeline(
@@ -186,8 +186,10 @@ impl PhotonEmitter {
         let label = "lightfall::PhotonEmitter";
         let group = resources.groups.get(&self.device, label, &self.layout, &bound);
         let (pipeline, spread) = match inputs.spread {
-            PhotonSpread::Even => (&self.emit, None),
-            PhotonSpread::Guided(guiding) => (&self.emit_by_cells, Some(guiding.tables.emission())),
+            PhotonSpread::Guided(guiding) if guiding.share() > 0.0 => {
+                (&self.emit_guided, Some(guiding.tables.emission()))
+            }
+            PhotonSpread::Even | PhotonSpread::Guided(_) => (&self.emit, None),
             PhotonSpread::Targets(targets) => (&self.emit_at_targets, Some(targets.buffer())),
         };
         let spread_group = spread.map(|buffer| {

@@ -1,5 +1,5 @@
 //! Sends photons where they count for the picture: more of them start, and go on from diffuse surfaces, in those directions whose
-//! paths were seen in earlier frames, each with less flux, so that no light is lost or gained on average.
+//! paths were seen in earlier frames, each with less flux, so that no light is lost or gained while paths are fresh in each frame.
 //!
 //! Inputs: [`Photons`] and a [`GBuffer`] of an earlier frame. Output: [`GuidingTables`], for [`PhotonEmitter`] and the tracers.
 //! A direction's share is the mean, over the tiles of the view, of its part in the photons that the tile shows, so that a tile with
@@ -7,7 +7,7 @@
 //! Peter and Pietrek 1998 (importance of photons for the picture); Vorba et al. 2014 (directions learned from earlier passes).
 //!
 //! Cost: twice a photon record and a depth texel for each hop and view, for those that are seen the hops before them, and 24 576
-//! tables of 16 numbers an update; 5 MB. Limits: 16 × 16 cells of a light's emission, 4 × 4 of the directions from each of 16³
+//! tables of 17 counts an update; 5.7 MB. Limits: 15 views between two updates; 16 × 16 cells of a light's emission, 4 × 4 of the directions from each of 16³
 //! places; what is seen of photons in metals and glass does not count; how photons are divided among lights stays;
 //! while the same paths are drawn in every frame, tables fit these, and one to two hundredths of the light are missing.
 //!
@@ -16,21 +16,26 @@
 use super::dispatch_64;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::guiding_tables::REFLECTION_TABLES;
-use crate::resource::{GBuffer, GuidingTables, Lights, Photons};
+use crate::resource::{GBuffer, GuidingTables, Lights, MAX_LIGHTS, Photons};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
-    /// Twin of `Params` in `shaders/pass/photon_guiding/params.wgsl`.
+    /// Twin of `CountParams` in `shaders/pass/photon_guiding/count_params.wgsl`.
     #[derive(Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
-    pub(crate) struct Params {
+    pub(crate) struct CountParams {
         pub(crate) path_count: u32,
         pub(crate) slot_count: u32,
         pub(crate) light_count: u32,
         pub(crate) row: u32,
-        pub(crate) share: f32,
+    }
+
+    /// Twin of `UpdateParams` in `shaders/pass/photon_guiding/update_params.wgsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct UpdateParams {
         pub(crate) kept: f32,
     }
 }
@@ -49,7 +54,7 @@ pub(crate) const COUNT_SLOTS: [Slot; 7] = [
 /// Bindings of `shaders/pass/photon_guiding/update_emission.wgsl`, and of `update_reflections.wgsl`, in order.
 pub(crate) const UPDATE_SLOTS: [Slot; 4] = [Slot::Uniform, Slot::StorageMut, Slot::StorageMut, Slot::StorageMut];
 
-/// Tiles along each axis of a view. Twin of `TILES` in `count_visible.wgsl`.
+/// Tiles along each axis of a view; with 16 the error is the same. Twin of `TILES` in `count_visible.wgsl`.
 pub(crate) const TILES: u32 = 32;
 
 /// Part of what was counted in earlier frames that an update keeps: what a table says changes over a few frames.
@@ -65,8 +70,8 @@ pub struct Guiding<'a> {
     pub tables: &'a GuidingTables,
     /// Share of the paths that are guided, at their light and at each diffuse surface, from 0 to 0.999, or what is nearest to it; the
     /// others are spread evenly, so that nothing is overlooked for good. Flux is weighed by the density of both together (Veach 1997,
-    /// balance heuristic): no photon is worth more than 1 / (1 − share) of those of a frame without guiding. The same for the emission,
-    /// the walk and the count of a frame.
+    /// balance heuristic): no photon is worth more than 1 / (1 − share) of those of a frame without guiding. The same for the emission
+    /// and the walk of a frame.
     pub share: f32,
 }
 
@@ -93,18 +98,18 @@ pub struct PhotonGuiding {
     update_reflections: wgpu::ComputePipeline,
 }
 
-/// Uniforms and bind groups, of a view or of the update.
+/// Uniform and bind groups of one view.
 #[derive(Debug)]
 pub struct PhotonGuidingResources {
-    count: Step,
+    params: wgpu::Buffer,
     /// Photons that each tile of the view shows.
     tiles: wgpu::Buffer,
-    update: Step,
+    groups: BindGroupCache,
 }
 
-/// Of one step: both may be recorded before either runs.
+/// Uniform and bind groups of the update.
 #[derive(Debug)]
-struct Step {
+pub struct GuidingUpdateResources {
     params: wgpu::Buffer,
     groups: BindGroupCache,
 }
@@ -120,8 +125,8 @@ pub struct PhotonGuidingInputs<'a> {
     pub lights: &'a Lights,
     /// Where they are seen.
     pub g_buffer: &'a GBuffer,
-    /// What they were guided by. What is counted is added to its tables.
-    pub guiding: Guiding<'a>,
+    /// What they were guided by; what is counted is added.
+    pub tables: &'a GuidingTables,
     /// Sink for GPU time.
     pub timestamps: Option<&'a Timestamps>,
 }
@@ -131,8 +136,6 @@ pub struct PhotonGuidingInputs<'a> {
 pub struct GuidingUpdateInputs<'a> {
     /// For the uniforms of this frame.
     pub queue: &'a wgpu::Queue,
-    /// Lights of the frame.
-    pub lights: &'a Lights,
     /// The tables are written, the counts cleared.
     pub tables: &'a GuidingTables,
     /// Sink for GPU time.
@@ -186,21 +189,19 @@ impl PhotonGuiding {
         inputs: &PhotonGuidingInputs<'_>,
     ) {
         let (groups, row) = dispatch_64(inputs.photons.slots());
-        let params = gpu::Params {
+        let params = gpu::CountParams {
             path_count: inputs.photons.count(),
             slot_count: inputs.photons.slots(),
             light_count: inputs.lights.count(),
             row,
-            share: inputs.guiding.share(),
-            kept: 0.0,
         };
         inputs
             .queue
-            .write_buffer(&resources.count.params, 0, bytemuck::bytes_of(&params));
-        let [emission_counts, _] = inputs.guiding.tables.emission_counts();
-        let [reflection_counts, _] = inputs.guiding.tables.reflection_counts();
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        let [emission_counts, _] = inputs.tables.emission_counts();
+        let [reflection_counts, _] = inputs.tables.reflection_counts();
         let bound = [
-            (&resources.count.params).into(),
+            (&resources.params).into(),
             inputs.photons.buffer().into(),
             emission_counts.into(),
             reflection_counts.into(),
@@ -209,10 +210,7 @@ impl PhotonGuiding {
             (&resources.tiles).into(),
         ];
         let label = "lightfall::PhotonGuiding::count";
-        let group = resources
-            .count
-            .groups
-            .get(&self.device, label, &self.count_layout, &bound);
+        let group = resources.groups.get(&self.device, label, &self.count_layout, &bound);
         encoder.clear_buffer(&resources.tiles, 0, None);
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_bind_group(0, &group, &[]);
@@ -226,20 +224,13 @@ impl PhotonGuiding {
     pub fn record_update(
         &self,
         encoder: &mut wgpu::CommandEncoder,
-        resources: &mut PhotonGuidingResources,
+        resources: &mut GuidingUpdateResources,
         inputs: &GuidingUpdateInputs<'_>,
     ) {
-        let params = gpu::Params {
-            path_count: 0,
-            slot_count: 0,
-            light_count: inputs.lights.count(),
-            row: 0,
-            share: 0.0,
-            kept: KEPT,
-        };
+        let params = gpu::UpdateParams { kept: KEPT };
         inputs
             .queue
-            .write_buffer(&resources.update.params, 0, bytemuck::bytes_of(&params));
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
         let label = "lightfall::PhotonGuiding::update";
         let tables = inputs.tables;
         let groups = [
@@ -247,21 +238,13 @@ impl PhotonGuiding {
             (tables.reflection_counts(), tables.reflection()),
         ]
         .map(|([counts, history], table)| {
-            let bound = [
-                (&resources.update.params).into(),
-                counts.into(),
-                history.into(),
-                table.into(),
-            ];
-            resources
-                .update
-                .groups
-                .get(&self.device, label, &self.update_layout, &bound)
+            let bound = [(&resources.params).into(), counts.into(), history.into(), table.into()];
+            resources.groups.get(&self.device, label, &self.update_layout, &bound)
         });
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.update_emission);
         pass.set_bind_group(0, &groups[0], &[]);
-        pass.dispatch_workgroups(inputs.lights.count(), 1, 1);
+        pass.dispatch_workgroups(MAX_LIGHTS as u32, 1, 1);
         pass.set_pipeline(&self.update_reflections);
         pass.set_bind_group(0, &groups[1], &[]);
         pass.dispatch_workgroups((REFLECTION_TABLES as u32).div_ceil(64), 1, 1);
@@ -275,23 +258,35 @@ impl PhotonGuidingResources {
     /// [`Error::LimitExceeded`] if the device grants next to nothing.
     pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
         use wgpu::BufferUsages as U;
-        let step = |uses| -> Result<_, Error> {
-            Ok(Step {
-                params: device::uniform_buffer::<gpu::Params>(device, "lightfall::PhotonGuiding::params")?,
-                groups: BindGroupCache::for_uses(uses),
-            })
-        };
         let bytes = 4 * u64::from(TILES * TILES);
         let usage = U::STORAGE | U::COPY_DST;
         Ok(Self {
-            count: step(1)?,
+            params: device::uniform_buffer::<gpu::CountParams>(device, "lightfall::PhotonGuiding::count")?,
             tiles: device::buffer(device, "lightfall::PhotonGuiding::tiles", bytes, usage)?,
-            update: step(2)?,
+            groups: BindGroupCache::default(),
         })
     }
 
     /// Bytes allocated.
     pub fn memory_use(&self) -> u64 {
-        self.count.params.size() + self.tiles.size() + self.update.params.size()
+        self.params.size() + self.tiles.size()
+    }
+}
+
+impl GuidingUpdateResources {
+    /// Resources on this device.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] if the device grants next to nothing.
+    pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
+        Ok(Self {
+            params: device::uniform_buffer::<gpu::UpdateParams>(device, "lightfall::PhotonGuiding::update")?,
+            groups: BindGroupCache::for_uses(2),
+        })
+    }
+
+    /// Bytes allocated.
+    pub fn memory_use(&self) -> u64 {
+        self.params.size()
     }
 }

@@ -52,7 +52,7 @@ pub(super) struct PhotonWalk {
 pub(super) struct PhotonWalkResources {
     /// Of the whole walk, then of each shared hop from 0 on: all hops of a frame are in one submission.
     params: Vec<wgpu::Buffer>,
-    /// Bound where no tables lead the walk.
+    /// Bound where no tables guide the walk.
     no_tables: wgpu::Buffer,
     groups: BindGroupCache,
 }

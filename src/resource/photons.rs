@@ -15,12 +15,12 @@ pub struct Photon {
     pub position: [f32; 3],
     /// Low two bits: a [`PhotonState`]. Bits 2 to 7: bits 0 to 5 of the surface's lobe, 0 if it is diffuse. Bit 8: the path came
     /// straight from its light. Bit 9: the tracer is not sure of the hop. Bit 10: the hop begins here, at its light, and is
-    /// still to be traced; `position`, `normal` and `direction` are those of its start. Bit 11: the surface's back is hit. Bit 12: it
-    /// came by way of metal and glass alone, in a [`PhotonMap::Global`]. Bit 13, beside bit 10: the light's rays are parallel. Bit 14, beside
-    /// bit 8 or 10: the light is flat. Bits 16
-    /// to 31 are 0 where no photons are guided and after the path's end, else (see [`GuidingTables`](super::GuidingTables)) bit 15
-    /// says whether this one is, bits 16 to 23 the cell that it started in, bits 24 to 31 b where those that are guided come this way 2^((b − 128) / 8) times as densely
-    /// as those that are spread evenly. Others 0.
+    /// still to be traced; `position`, `normal` and `direction` are those of its start. Bit 11: the surface's back is hit.
+    /// Bit 12: it came by way of metal and glass alone, in a [`PhotonMap::Global`]. Bit 13, beside bit 10: the light's rays are
+    /// parallel. Bit 14, beside bit 8 or 10: the light is flat. Bits 15 to 31 are 0 where no photons are guided and after the
+    /// path's end, else (see [`GuidingTables`](super::GuidingTables)): bit 15, this one is; bits 16 to 23, the cell that it
+    /// started in; bits 24 to 31, b where those that are guided come this way 2^((b − 128) / 8) times as densely as those that
+    /// are spread evenly.
     pub state: u32,
     /// Radiant flux that the hop carried, unit frame, before the surface takes its share.
     pub flux: [f32; 3],

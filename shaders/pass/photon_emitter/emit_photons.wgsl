@@ -44,16 +44,18 @@ fn emit_photons(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-// The first of each light's, a share of them, as the tables say: both parts of the sequence are as evenly spread as the whole.
+// The first of each light's, a share of them rounded by chance, as the tables say: both parts of the sequence are as evenly spread
+// as the whole.
 @compute @workgroup_size(64)
-fn emit_photons_by_cells(@builtin(global_invocation_id) id: vec3u) {
+fn emit_guided_photons(@builtin(global_invocation_id) id: vec3u) {
     let index = id.y * params.row + id.x;
     if id.x >= params.row || index >= params.photon_count {
         return;
     }
     let light = light_of(index);
     let sequence_index = params.sample_offset + index;
-    let is_guided = f32(index - lights[light].first_photon) < params.guided * f32(lights[light].photon_count);
+    let rounded = params.guided * f32(lights[light].photon_count) + hash_unit(params.sample_offset, light);
+    let is_guided = f32(index - lights[light].first_photon) < floor(rounded);
     var u = random_pair(sequence_index, 0u);
     if is_guided {
         u = emission_place(light, u);
@@ -63,8 +65,8 @@ fn emit_photons_by_cells(@builtin(global_invocation_id) id: vec3u) {
     emit_photon(index, u, photon_boost(guiding, params.guided), guiding);
 }
 
-// `boost`: how many times as many photons start this way as would if they were spread evenly; `kept`: bits of the state that the
-// path carries on.
+// `boost`: how many times as many photons start this way as would if they were spread evenly; `kept`: bits of the state that say
+// so.
 fn emit_photon(index: u32, u: vec2f, boost: f32, kept: u32) {
     let light_index = light_of(index);
     let light = lights[light_index];
@@ -73,12 +75,13 @@ fn emit_photon(index: u32, u: vec2f, boost: f32, kept: u32) {
         return;
     }
     if starts_on_surface(light) {
-        let place = surface_start(light, params.sample_offset + index, light.photon_count);
+        var place = surface_start(light, params.sample_offset + index, light.photon_count);
+        place.flux /= boost;
         let direction = normalize(sampling_frame(place.normal) * sampling_cosine(u));
-        photons[index] = photon_started(place, light_index, direction, boost, kept);
+        photons[index] = photon_started(place, light_index, direction, 1.0, kept);
         return;
     }
     let within = light_within(light, params.sample_offset + index);
     let emission = emit(within, u);
-    photons[index] = photon_on_ray(light_index, emission.ray, boost * emission.pdf, within.photon_flux / boost, kept);
+    photons[index] = photon_on_ray(light_index, emission.ray, emission.pdf, within.photon_flux / boost, kept);
 }

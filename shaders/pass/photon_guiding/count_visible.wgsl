@@ -1,7 +1,7 @@
-// Weighs the hops that arrive where the eye sees by how much of their part of the image they stand for: first the photons of each
+// Weighs the hops of guided paths that arrive where the eye sees by how much of their part of the image they stand for: first those of each
 // tile of the view are counted, then each hop brings its share of its tile to all cells that its path came by.
 
-@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(0) var<uniform> params: CountParams;
 @group(0) @binding(1) var<storage, read> photons: array<Photon>;
 @group(0) @binding(2) var<storage, read_write> emission_counts: array<atomic<u32>>;
 @group(0) @binding(3) var<storage, read_write> reflection_counts: array<atomic<u32>>;
@@ -13,16 +13,19 @@
 const TILES: u32 = 32u;
 const TILE_TOTAL: u32 = TILES * TILES;
 const NO_TILE: u32 = TILE_TOTAL;
-// What a photon counts in its tile that started as densely as if all were spread evenly.
-const EVEN_PHOTON: f32 = 64.0;
-// What all hops of a tile bring together.
+// What a photon counts in its tile where guided photons are as dense as others: four million fit 32 bits.
+const EVEN_PHOTON: f32 = 1024.0;
+// What all hops of a tile bring together: the tiles of fifteen views fit 32 bits.
 const TILE_WEIGHT: f32 = 0x1p18;
-// A photon is seen if it lies no further from what its pixel shows than this share of the distance to the eye.
+// Random dimension of rounding.
+const ROUNDING_DIMENSION: u32 = 3584u;
+// A photon is seen if it lies no further from what its pixel shows than this share of its depth, or of the region of a parallel view.
 const TOLERANCE: f32 = 0.02;
 
-// The tile that a hop is seen in.
+// The tile that a hop is seen in, if its path is guided. Tables made from paths that are not, the same in every frame, would fit these and
+// weigh them too low.
 fn tile_of(photon: Photon) -> u32 {
-    if !photon_is_splatted(photon.state) {
+    if !photon_is_splatted(photon.state) || (photon.state & PHOTON_IS_GUIDED) == 0u {
         return NO_TILE;
     }
     let clip = view.view_projection * vec4f(photon.position, 1.0);
@@ -34,16 +37,17 @@ fn tile_of(photon: Photon) -> u32 {
     let at = min(vec2u(place * vec2f(view.size)), view.size - 1u);
     let depth = textureLoad(depth_texture, view.origin + at, 0).x;
     let surface = g_buffer_position(view, vec2f(at), depth);
-    if distance(surface, photon.position) > TOLERANCE * abs(clip.w) {
+    // Nothing lies where there is no surface.
+    if !(distance(surface, photon.position) <= TOLERANCE * abs(clip.w)) {
         return NO_TILE;
     }
     let tile = min(vec2u(place * f32(TILES)), vec2u(TILES - 1u));
     return tile.y * TILES + tile.x;
 }
 
-// In how many parts of EVEN_PHOTON it counts: as many as it has flux.
-fn photon_count(photon: Photon) -> u32 {
-    return u32(max(1.0, round(EVEN_PHOTON / photon_boost(photon.state, params.share))));
+// As how much it counts in its tile: the less, the more densely guided photons come its way.
+fn part_of(photon: Photon) -> u32 {
+    return u32(max(1.0, round(EVEN_PHOTON / photon_guidance(photon.state))));
 }
 
 fn slot_of(id: vec3u) -> u32 {
@@ -59,7 +63,7 @@ fn count_tiles(@builtin(global_invocation_id) id: vec3u) {
     let photon = photons[slot];
     let tile = tile_of(photon);
     if tile != NO_TILE {
-        atomicAdd(&tiles[tile], photon_count(photon));
+        atomicAdd(&tiles[tile], part_of(photon));
     }
 }
 
@@ -75,7 +79,8 @@ fn count_visible(@builtin(global_invocation_id) id: vec3u) {
     if tile == NO_TILE || light >= params.light_count {
         return;
     }
-    let weight = u32(TILE_WEIGHT * f32(photon_count(photon)) / f32(atomicLoad(&tiles[tile])));
+    let share = f32(part_of(photon)) / f32(atomicLoad(&tiles[tile]));
+    let weight = u32(TILE_WEIGHT * share + hash_unit(slot, ROUNDING_DIMENSION));
     let emission = EMISSION_COUNTS * (light * EMISSION_CELL_TOTAL + photon_cell(photon.state));
     atomicAdd(&emission_counts[emission], weight);
     atomicAdd(&emission_counts[emission + 1u], 1u);

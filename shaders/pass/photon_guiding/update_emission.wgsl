@@ -1,6 +1,6 @@
 // Makes the tables of emissions from what was counted: a workgroup for each light, an invocation for each cell.
 
-@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(0) var<uniform> params: UpdateParams;
 @group(0) @binding(1) var<storage, read_write> counts: array<u32>;
 // The same over the frames
 @group(0) @binding(2) var<storage, read_write> history: array<f32>;

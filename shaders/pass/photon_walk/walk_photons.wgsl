@@ -108,7 +108,7 @@ fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) ->
     var u = random_pair(sequence_index, 2u * bounce);
     var boost = 1.0;
     var origin = photon;
-    if walk.guided > 0.0 {
+    if walk.guided > 0.0 && photon_goes_by_tables(photon.state) {
         let table = reflection_table(photon.position, normal);
         let is_guided = (photon.state & PHOTON_IS_GUIDED) != 0u;
         if is_guided {
@@ -123,7 +123,7 @@ fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) ->
     let local = sampling_cosine(u);
     let direction = normalize(sampling_frame(normal) * local);
     let hit = trace_ray(photon.position, normal, direction);
-    return arrived(origin, flux / boost, direction, spread_from_point(boost * WALK_INVERSE_PI * local.z), hit);
+    return arrived(origin, flux / boost, direction, spread_from_point(WALK_INVERSE_PI * local.z), hit);
 }
 
 // The first hop of a photon that stands at its light.

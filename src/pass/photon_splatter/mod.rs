@@ -125,7 +125,8 @@ pub enum Bandwidth {
     /// The same for all, as a share of the region's radius.
     Fixed(f32),
     /// From the density that the photon's last hop implies: h = √(k A / (π N p̂)), p̂ its density over the uniform one,
-    /// so that about `photons` of N photons lie under a kernel.
+    /// so that about `photons` of N photons lie under a kernel. Where photons are guided, divided by the sixth root of how much
+    /// denser they are, if half of them are.
     Density {
         /// k, photons under a kernel.
         photons: f32,
