@@ -82,7 +82,7 @@ impl Default for UpsamplerSettings {
         Self {
             normal_agreement: 0.7,
             plane_distance: 0.5,
-            disagreement: 0.5,
+            disagreement: 0.25,
         }
     }
 }
