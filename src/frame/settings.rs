@@ -703,6 +703,9 @@ const KNOBS: &[Knob] = &[
             _ => true,
         },
     },
+    field!("splatter.min_radius", "0 to 23 pixels", splatter.min_radius, |v| (0.0
+        ..=LARGEST_RADIUS)
+        .contains(&v)),
     field!(
         "splatter.max_radius",
         "above 0, up to 23 pixels",

@@ -99,10 +99,10 @@ pub enum SplatShape {
     /// Blended quads in the surface plane. Surfaces that stand on it within the kernel, as beyond a crease of less than 45°,
     /// are missed where the quad does not cover them on the screen. Where the size of the G-buffer is no multiple of a
     /// sub-sampling factor, the last row or column of samples stands up to half a block nearer than quads are drawn for,
-    /// and misses a rim of them. Sums in `rgba16float` lose about a percent at a hundred photons a pixel and stagnate above
+    /// and misses a rim of them. Sums in `rgba16float` lose some 4 % at a hundred photons a pixel and stagnate above
     /// a thousand; where the device has `FLOAT32_BLENDABLE`, an `rgba32float` target does not.
     Quads,
-    /// Blended flattened icosahedra, which cover all that the kernel may reach from any side: five times the vertices and up
+    /// Blended flattened icosahedra, which cover all that the kernel may reach from any side: fifteen times the vertices and up
     /// to twice the pixels of quads. Sums are those of quads.
     Volumes,
 }
@@ -128,7 +128,7 @@ pub enum Bandwidth {
     /// so that about `photons` of N photons lie under a kernel. Where photons are guided, divided by the sixth root of how much
     /// denser they are, if half of them are.
     Density {
-        /// k, photons under a kernel.
+        /// k, photons under a kernel: error is least where k grows as N to the 2/3, by which noise and blur fall alike.
         photons: f32,
         /// Range that p̂ is clamped to.
         clamp: [f32; 2],
@@ -192,7 +192,7 @@ pub struct PhotonSplatterSettings {
     /// Widest kernel radius in pixels of the irradiance, up to 23: bounds the cost of a photon near the eye. Where
     /// irradiance is sub-sampled, kernels may thus be wider by the factor.
     pub max_radius: f32,
-    /// Factor on the radius, after its clamps: [`progressive_scale`] of the frame where frames are accumulated, else 1.
+    /// Factor on the radius and on `min_radius`, before `max_radius`: [`progressive_scale`] of the frame where frames are accumulated, else 1.
     pub radius_scale: f32,
     /// What is done at rims.
     pub boundary: BoundaryCorrection,
@@ -401,7 +401,7 @@ impl PhotonSplatter {
         &self.config
     }
 
-    /// Records the estimate.
+    /// Records the estimate: none with resources of another shape, for fewer photons or for smaller irradiance.
     pub fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -676,7 +676,42 @@ pub(super) fn free_bandwidth(bandwidth: Bandwidth, count: u32, (area, radius): (
 
 #[cfg(test)]
 mod tests {
-    use super::progressive_scale;
+    use super::{Bandwidth, free_bandwidth, progressive_scale};
+    use crate::scene::{SceneBounds, UnitFrame};
+    use glam::DVec3;
+
+    #[test]
+    fn radii_grow_with_the_scene_where_its_unit_is_doubled() {
+        // A cube of side `scale`: kernels over the scene, and its unit. Units are powers of two.
+        let kernels = |scale: f64| {
+            let bounds = SceneBounds::new(DVec3::ZERO, DVec3::splat(scale)).unwrap();
+            let frame = UnitFrame::new(&bounds, 1.0).unwrap();
+            let region = (frame.area(6.0 * scale * scale), frame.radius());
+            let clamp = [0.25, 4.0];
+            let rules = [
+                Bandwidth::Fixed(0.1),
+                Bandwidth::Density { photons: 50.0, clamp },
+                Bandwidth::Screen { photons: 50.0, clamp },
+            ];
+            let radii = rules.map(|rule| {
+                let (bandwidth, widest) = free_bandwidth(rule, 10_000, region);
+                // What a density that is three photons on a unit of the scene's own area leaves of the radius.
+                let density = 3.0 / frame.area(scale * scale) / bandwidth.uniform;
+                [bandwidth.scale, widest, bandwidth.scale / density.sqrt()]
+                    .map(|radius| f64::from(radius) * frame.length_scale() / scale)
+            });
+            (radii, frame.length_scale())
+        };
+        let units = (0..100).map(|i| (1.01f64.powi(i), 1.01f64.powi(i + 1)));
+        let [(below, unit), (above, next)] = units
+            .map(|(a, b)| [kernels(a), kernels(b)])
+            .find(|[(_, a), (_, b)]| a != b)
+            .expect("a unit between 1 and e");
+        assert_eq!(next, 2.0 * unit);
+        for (a, b) in below.as_flattened().iter().zip(above.as_flattened()) {
+            assert!((a / b - 1.0).abs() < 1e-6, "{a} and {b}");
+        }
+    }
 
     #[test]
     fn radii_of_accumulated_frames_shrink_as_they_should() {
