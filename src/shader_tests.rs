@@ -337,8 +337,11 @@ fn twins() -> Vec<Twin> {
             light_count, shadow_map_size, layer_count,
         }),
         twin!(wgsl::SOFT_SHADOW_BLUR, "Params", soft_shadow::gpu::Params {
-            light, shadow_map_size, layer_count, search, search_taps, blur_taps, max_radius, range_scale,
+            light, shadow_map_size, layer_count, search, search_taps, blur_taps, disc_taps, rays, sample_offset, is_gathered,
+            max_radius, range_scale,
         }),
+        twin!(wgsl::SOFT_SHADOW_LIST, "Listing", soft_shadow::gather::gpu::TileList { workgroups, count, tiles }),
+        twin!(wgsl::SOFT_SHADOW_BLUR, "TileList", soft_shadow::gather::gpu::TileList { workgroups, count, tiles }),
         twin!(wgsl::COMPOSITE, "Params", composite::gpu::Params {
             output_scale, direct_weight, indirect_weight, caustic_weight, emission_weight, diffuse_weight, has_specular,
         }),
@@ -489,9 +492,15 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "IrradianceFilter" => vec![&irradiance_filter::SLOTS],
         "DirectLight" => vec![&direct_light::SLOTS, &direct_light::VISIBILITY_SLOTS],
         "NearestOccluder" => vec![&nearest_occluder::SLOTS],
-        "SoftShadow test" => vec![&soft_shadow::TEST_SLOTS],
-        "SoftShadow search" => vec![&soft_shadow::SEARCH_SLOTS],
-        "SoftShadow blur" => vec![&soft_shadow::BLUR_SLOTS],
+        "SoftShadow test" => vec![&soft_shadow::gather::TEST_SLOTS, &soft_shadow::gather::MAP_SLOTS],
+        #[cfg(feature = "bvh")]
+        "SoftShadow test by triangles" => vec![&soft_shadow::gather::TEST_SLOTS, &bvh_geometry::BVH_SLOTS],
+        "SoftShadow list" => vec![&soft_shadow::gather::LIST_SLOTS],
+        "SoftShadow search" => vec![&soft_shadow::gather::SEARCH_SLOTS],
+        "SoftShadow blur" | "SoftShadow disc" => vec![&soft_shadow::gather::BLUR_SLOTS],
+        "SoftShadow filter" => vec![&soft_shadow::filter::FILTER_SLOTS, &soft_shadow::gather::MAP_SLOTS],
+        #[cfg(feature = "bvh")]
+        "SoftShadow trace" => vec![&soft_shadow::trace::TRACE_SLOTS, &bvh_geometry::BVH_SLOTS],
         "Upsampler" => vec![&upsampler::SLOTS],
         "Composite" => vec![&composite::SLOTS],
         "Accumulator" => vec![&accumulator::SLOTS],

@@ -467,6 +467,10 @@ pub(crate) const NEAREST_OCCLUDER: &str = compose![
 
 pub(crate) const SOFT_SHADOW_TEST: &str = compose![
     "pass/soft_shadow/test_light.wgsl",
+    "pass/soft_shadow/test_by_maps.wgsl",
+    "pass/soft_shadow/reach.wgsl",
+    "pass/soft_shadow/tiles.wgsl",
+    "pass/soft_shadow/plane.wgsl",
     "pass/soft_shadow/receiver.wgsl",
     "common/shadow.wgsl",
     "common/light.wgsl",
@@ -478,8 +482,41 @@ pub(crate) const SOFT_SHADOW_TEST: &str = compose![
     "common/sampling.wgsl",
 ];
 
+#[cfg(feature = "bvh")]
+pub(crate) const SOFT_SHADOW_TEST_BY_TRIANGLES: &str = compose![
+    "pass/soft_shadow/test_light.wgsl",
+    "pass/soft_shadow/test_by_triangles.wgsl",
+    "pass/soft_shadow/reach.wgsl",
+    "pass/soft_shadow/tiles.wgsl",
+    "pass/soft_shadow/plane.wgsl",
+    "pass/soft_shadow/receiver.wgsl",
+    "common/shadow.wgsl",
+    "common/light.wgsl",
+    "common/g_buffer.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+    "pass/bvh_tracer/bindings.wgsl",
+    "common/bvh.wgsl",
+    "common/bvh_surface.wgsl",
+    "common/lobe.wgsl",
+];
+
+pub(crate) const SOFT_SHADOW_LIST: &str = compose![
+    "pass/soft_shadow/list_tiles.wgsl",
+    "pass/soft_shadow/tiles.wgsl",
+    "common/g_buffer.wgsl",
+    "common/octahedral.wgsl",
+];
+
 pub(crate) const SOFT_SHADOW_SEARCH: &str = compose![
     "pass/soft_shadow/search_occluders.wgsl",
+    "pass/soft_shadow/reach.wgsl",
+    "pass/soft_shadow/tile_list_pixel.wgsl",
+    "pass/soft_shadow/tiles.wgsl",
+    "pass/soft_shadow/plane.wgsl",
     "pass/soft_shadow/receiver.wgsl",
     "common/shadow.wgsl",
     "common/light.wgsl",
@@ -494,7 +531,12 @@ pub(crate) const SOFT_SHADOW_SEARCH: &str = compose![
 
 pub(crate) const SOFT_SHADOW_BLUR: &str = compose![
     "pass/soft_shadow/blur_axis.wgsl",
+    "pass/soft_shadow/penumbra_found.wgsl",
+    "pass/soft_shadow/tile_list_pixel.wgsl",
+    "pass/soft_shadow/tiles.wgsl",
+    "pass/soft_shadow/plane.wgsl",
     "pass/soft_shadow/receiver.wgsl",
+    "common/shadow.wgsl",
     "common/light.wgsl",
     "common/g_buffer.wgsl",
     "common/surface_texel.wgsl",
@@ -502,6 +544,63 @@ pub(crate) const SOFT_SHADOW_BLUR: &str = compose![
     "common/reflectance.wgsl",
     "common/cube_face.wgsl",
     "common/sampling.wgsl",
+];
+
+pub(crate) const SOFT_SHADOW_DISC: &str = compose![
+    "pass/soft_shadow/blur_disc.wgsl",
+    "pass/soft_shadow/penumbra_found.wgsl",
+    "pass/soft_shadow/disc.wgsl",
+    "pass/soft_shadow/tile_list_pixel.wgsl",
+    "pass/soft_shadow/tiles.wgsl",
+    "pass/soft_shadow/plane.wgsl",
+    "pass/soft_shadow/receiver.wgsl",
+    "common/shadow.wgsl",
+    "common/light.wgsl",
+    "common/g_buffer.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+];
+
+pub(crate) const SOFT_SHADOW_FILTER: &str = compose![
+    "pass/soft_shadow/filter_maps.wgsl",
+    "pass/soft_shadow/test_by_maps.wgsl",
+    "pass/soft_shadow/reach.wgsl",
+    "pass/soft_shadow/disc.wgsl",
+    "pass/soft_shadow/plane.wgsl",
+    "pass/soft_shadow/receiver.wgsl",
+    "common/shadow.wgsl",
+    "common/light.wgsl",
+    "common/g_buffer.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+];
+
+#[cfg(feature = "bvh")]
+pub(crate) const SOFT_SHADOW_TRACE: &str = compose![
+    "pass/soft_shadow/trace_lamp.wgsl",
+    "pass/soft_shadow/receiver.wgsl",
+    "common/shadow.wgsl",
+    "common/light.wgsl",
+    "common/g_buffer.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+    "common/polygon.wgsl",
+    "common/random.wgsl",
+    "common/halton.wgsl",
+    "common/hash.wgsl",
+    "pass/bvh_tracer/bindings.wgsl",
+    "common/bvh.wgsl",
+    "common/bvh_surface.wgsl",
+    "common/lobe.wgsl",
 ];
 
 pub(crate) const SPECULAR_PATHS_BEGIN: &str = compose![
@@ -718,8 +817,15 @@ pub const MODULES: &[(&str, &str)] = &[
     ("DirectLight", DIRECT_LIGHT),
     ("NearestOccluder", NEAREST_OCCLUDER),
     ("SoftShadow test", SOFT_SHADOW_TEST),
+    #[cfg(feature = "bvh")]
+    ("SoftShadow test by triangles", SOFT_SHADOW_TEST_BY_TRIANGLES),
+    ("SoftShadow list", SOFT_SHADOW_LIST),
     ("SoftShadow search", SOFT_SHADOW_SEARCH),
     ("SoftShadow blur", SOFT_SHADOW_BLUR),
+    ("SoftShadow disc", SOFT_SHADOW_DISC),
+    ("SoftShadow filter", SOFT_SHADOW_FILTER),
+    #[cfg(feature = "bvh")]
+    ("SoftShadow trace", SOFT_SHADOW_TRACE),
     ("Composite", COMPOSITE),
     ("Accumulator", ACCUMULATOR),
     ("ToneMap", TONE_MAP),

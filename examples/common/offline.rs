@@ -58,7 +58,7 @@ impl<'a> Offline<'a> {
         let (device, queue) = (&gpu.device, &gpu.queue);
         let mut geometry = MeshGeometry::new(device, queue, &scene)?;
         let bvh = || BvhGeometry::new(device, queue, &scene, &BvhGeometryConfig::default());
-        let bvh = settings.tracer_kind.uses_triangles().then(bvh).transpose()?;
+        let bvh = settings.uses_triangles().then(bvh).transpose()?;
         let mut renderer = GiRenderer::new(device, settings)?;
         let summary = SceneSummary::of(&scene)?;
         renderer.set_environment(queue, scene.environment_image())?;

@@ -98,6 +98,13 @@ struct SceneState {
     area: f32,
 }
 
+/// What to do where there are no triangles for rays, or for shadows.
+#[cfg(feature = "bvh")]
+const NO_RAYS: &str = "prepare a BvhGeometry each frame, or choose tracer.kind = image-space";
+#[cfg(feature = "bvh")]
+const NO_SHADOW_RAYS: &str =
+    "prepare a BvhGeometry each frame, or choose another soft_shadow.method and soft_shadow.test = shadow-maps";
+
 /// Most lamps that triangles are grouped into: each has six layers of shadow maps.
 const MOST_LAMPS: usize = 16;
 
@@ -171,7 +178,7 @@ pub struct ViewInputs<'a> {
     /// The geometry that was prepared.
     pub geometry: &'a dyn Geometry,
     /// The same geometry as triangles, prepared for this frame: what rays of [`Stage::FinalGather`] and
-    /// [`Stage::SpecularPaths`] meet where the settings trace triangles.
+    /// [`Stage::SpecularPaths`] meet where the settings trace triangles, and those of [`Stage::SoftShadow`] where they say so.
     #[cfg(feature = "bvh")]
     pub bvh: Option<&'a BvhGeometry>,
     /// One of the views that were prepared.
@@ -683,7 +690,7 @@ impl GiRenderer {
             return Err(Error::MissingInput {
                 stage: "BvhTracer",
                 input: "SceneInputs::bvh",
-                remedy: "prepare a BvhGeometry each frame, or choose tracer.kind = image-space",
+                remedy: NO_RAYS,
             });
         }
         Ok(())
@@ -692,19 +699,22 @@ impl GiRenderer {
     #[cfg(feature = "bvh")]
     fn check_view_triangles(&self, inputs: &ViewInputs<'_>) -> Result<(), Error> {
         let is_on = |stage| self.plan().is_some_and(|p| p.is_on(stage));
-        let stage = match (is_on(Stage::FinalGather), is_on(Stage::SpecularPaths)) {
-            (true, _) => "FinalGather",
-            (false, true) => "SpecularPaths",
-            _ => return Ok(()),
+        let traces = self.settings.tracer_kind.uses_triangles();
+        let shades = self.settings.soft_shadow.uses_triangles();
+        let (stage, remedy) = match () {
+            () if traces && is_on(Stage::FinalGather) => ("FinalGather", NO_RAYS),
+            () if traces && is_on(Stage::SpecularPaths) => ("SpecularPaths", NO_RAYS),
+            () if shades && is_on(Stage::SoftShadow) => ("SoftShadow", NO_SHADOW_RAYS),
+            () => return Ok(()),
         };
-        if inputs.bvh.is_none() && self.settings.tracer_kind.uses_triangles() {
-            return Err(Error::MissingInput {
+        match inputs.bvh {
+            Some(_) => Ok(()),
+            None => Err(Error::MissingInput {
                 stage,
                 input: "ViewInputs::bvh",
-                remedy: "prepare a BvhGeometry each frame, or choose tracer.kind = image-space",
-            });
+                remedy,
+            }),
         }
-        Ok(())
     }
 
     fn record_shadow_maps(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) {
@@ -792,7 +802,8 @@ impl GiRenderer {
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] when a stage that the view needs for the first time does not fit; [`Error::MissingInput`] if
-    /// [`Stage::FinalGather`] or [`Stage::SpecularPaths`] is on, the settings trace triangles, and none are given. Nothing is recorded then.
+    /// [`Stage::FinalGather`], [`Stage::SpecularPaths`] or [`Stage::SoftShadow`] is on, the settings trace triangles there, and none
+    /// are given. Nothing is recorded then.
     pub fn record_view(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -814,14 +825,18 @@ impl GiRenderer {
         if let (Some(scene), Some((visibility, own))) = (&self.direct, &mut resources.soft)
             && let Some((nearest, _)) = &scene.soft
         {
+            let soft_settings = self.settings.soft_shadows(&scene.lights);
             let soft_inputs = SoftShadowInputs {
                 queue: inputs.queue,
                 g_buffer: &resources.g_buffer,
                 lights: &scene.lights,
                 shadow_maps: &scene.shadow_maps,
                 nearest,
+                #[cfg(feature = "bvh")]
+                bvh: inputs.bvh,
                 visibility,
-                settings: &self.settings.soft_shadow,
+                settings: &soft_settings,
+                sample_offset: self.sample_offset,
                 timestamps: inputs.timestamps,
             };
             self.passes.soft_shadow.record(encoder, own, &soft_inputs);

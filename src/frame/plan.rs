@@ -1,7 +1,7 @@
 //! Model only what the scene requires: which stages run, and why.
 
 use super::{GlossyMethod, IndirectMethod, Settings, TracerKind};
-use crate::pass::{FirstHits, PenumbraSearch};
+use crate::pass::FirstHits;
 use crate::resource::MAX_DIRECT_POLYGONS;
 use crate::scene::SceneSummary;
 use std::fmt;
@@ -118,9 +118,9 @@ impl Plan {
         let soft = (lit.0 && has_extent, soft);
         let stage = |stage, (on, reason): (bool, String)| PlannedStage { stage, on, reason };
         let always = |reason: &str| (true, reason.to_owned());
-        let nearest = match settings.soft_shadow.search {
-            PenumbraSearch::On => soft.clone(),
-            PenumbraSearch::Off => (false, "settings search no occluders".to_owned()),
+        let nearest = match settings.soft_shadow.searches() {
+            true => soft.clone(),
+            false => (false, "settings search no occluders".to_owned()),
         };
         let [selection, maps, hierarchies] = map_stages(&indirect, settings);
         let [image_space, bvh] = tracers(&indirect, settings);

@@ -3,10 +3,11 @@
 use crate::Error;
 use crate::pass::{
     Bandwidth, BoundaryCorrection, CoverageMeasure, EnvMapSelectorResources, EnvMapSelectorSettings, FirstHits,
-    ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS, MAX_SELECTED, MAX_TAPS, MOST_FILTER_RADIUS, PenumbraSearch,
-    PhotonSplatterConfig, PhotonSplatterSettings, SoftShadowSettings, SplatShape, TraceMethod, UpsamplerSettings,
+    ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS, MAX_POINTS, MAX_SELECTED, MAX_TAPS, MOST_FILTER_RADIUS,
+    OccluderTest, PenumbraSearch, PhotonSplatterConfig, PhotonSplatterSettings, ShadowMethod, SoftShadowSettings,
+    SplatShape, TraceMethod, UpsamplerSettings,
 };
-use crate::resource::Subsampling;
+use crate::resource::{Lights, MAX_LIGHTS, Subsampling};
 
 /// Most scatterings of a path.
 const MAX_BOUNCES: u32 = 64;
@@ -154,8 +155,11 @@ pub struct Settings {
     pub environment_suns: u32,
     /// Texels along a layer of a shadow map. Finer sharpens shadow edges, direct and in first hits; costs as the square.
     pub shadow_map_size: u32,
-    /// How penumbrae of lights with an extent are gathered.
+    /// How penumbrae of lights with an extent are found.
     pub soft_shadow: SoftShadowSettings,
+    /// Most lights whose penumbrae are found in a view, those of most flux; shadows of the others are hard. Fewer cost less in
+    /// proportion.
+    pub soft_lights: u32,
     /// Where environment maps are taken from.
     pub selector: EnvMapSelectorSettings,
     /// What photons are traced through.
@@ -251,6 +255,7 @@ impl Settings {
             environment_suns: 24,
             shadow_map_size: 512,
             soft_shadow: SoftShadowSettings::default(),
+            soft_lights: MAX_LIGHTS as u32,
             selector: EnvMapSelectorSettings::default(),
             tracer_kind: TracerKind::default(),
             trace_method: TraceMethod::default(),
@@ -365,6 +370,22 @@ impl Settings {
         }
     }
 
+    /// Whether a host must bring a `BvhGeometry`: rays or shadows meet its triangles.
+    pub fn uses_triangles(&self) -> bool {
+        self.tracer_kind.uses_triangles() || self.soft_shadow.uses_triangles()
+    }
+
+    /// How the penumbra of each light is found: those of most flux as settings say, the others not at all.
+    pub(super) fn soft_shadows(&self, lights: &Lights) -> Vec<SoftShadowSettings> {
+        let mut all = vec![self.soft_shadow; lights.count() as usize];
+        let has_extent: Vec<_> = lights.have_extent().collect();
+        let soft = lights.by_flux().into_iter().filter(|&light| has_extent[light]);
+        for light in soft.skip(self.soft_lights as usize) {
+            all[light].method = ShadowMethod::Hard;
+        }
+        all
+    }
+
     /// Whether there are environment maps.
     pub(super) fn needs_env_maps(&self) -> bool {
         self.tracer_kind.uses_env_maps() || self.indirect_method == IndirectMethod::FinalGather
@@ -422,6 +443,16 @@ const TRACER_KINDS: &str = "image-space, bvh or hybrid";
 #[cfg(not(feature = "bvh"))]
 const TRACER_KINDS: &str = "image-space (bvh and hybrid need the cargo feature `bvh`)";
 
+#[cfg(feature = "bvh")]
+const SHADOW_METHODS: &str = "hard, pcf, pcss, cross, disc or rays";
+#[cfg(not(feature = "bvh"))]
+const SHADOW_METHODS: &str = "hard, pcf, pcss, cross or disc (rays need the cargo feature `bvh`)";
+
+#[cfg(feature = "bvh")]
+const OCCLUDER_TESTS: &str = "shadow-maps or triangles";
+#[cfg(not(feature = "bvh"))]
+const OCCLUDER_TESTS: &str = "shadow-maps (triangles need the cargo feature `bvh`)";
+
 /// A knob over a plain field that parses from text.
 macro_rules! field {
     ($name:literal, $expected:literal, $($path:ident).+, $valid:expr) => {
@@ -475,6 +506,31 @@ const KNOBS: &[Knob] = &[
     field!("environment.suns", "0 to 48", environment_suns, |v| v <= MOST_SUNS),
     field!("shadow_maps.size", "4 to 8192", shadow_map_size, |v| (4..=8192)
         .contains(&v)),
+    Knob {
+        is_valid: |s| cfg!(feature = "bvh") || s.soft_shadow.method != ShadowMethod::Rays,
+        ..choice!(
+            "soft_shadow.method",
+            SHADOW_METHODS,
+            soft_shadow.method,
+            ["hard", ShadowMethod::Hard],
+            ["pcf", ShadowMethod::Pcf],
+            ["pcss", ShadowMethod::Pcss],
+            ["cross", ShadowMethod::Cross],
+            ["disc", ShadowMethod::Disc],
+            ["rays", ShadowMethod::Rays]
+        )
+    },
+    Knob {
+        is_valid: |s| cfg!(feature = "bvh") || s.soft_shadow.test != OccluderTest::Triangles,
+        ..choice!(
+            "soft_shadow.test",
+            OCCLUDER_TESTS,
+            soft_shadow.test,
+            ["shadow-maps", OccluderTest::ShadowMaps],
+            ["triangles", OccluderTest::Triangles]
+        )
+    },
+    field!("soft_shadow.lights", "0 to 64", soft_lights, |v| v <= MAX_LIGHTS as u32),
     choice!(
         "soft_shadow.search",
         "on or off",
@@ -487,6 +543,11 @@ const KNOBS: &[Knob] = &[
         .contains(&v)),
     field!("soft_shadow.blur_taps", "1 to 64", soft_shadow.blur_taps, |v| (1
         ..=MAX_TAPS)
+        .contains(&v)),
+    field!("soft_shadow.disc_taps", "1 to 4096", soft_shadow.disc_taps, |v| (1
+        ..=MAX_POINTS)
+        .contains(&v)),
+    field!("soft_shadow.rays", "1 to 4096", soft_shadow.rays, |v| (1..=MAX_POINTS)
         .contains(&v)),
     field!(
         "soft_shadow.max_radius",

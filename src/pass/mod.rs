@@ -72,8 +72,10 @@ pub use photon_splatter::{
 };
 pub use photon_walk::SharedHop;
 pub use shadow_map_capture::{ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources};
-pub(crate) use soft_shadow::MAX_TAPS;
-pub use soft_shadow::{PenumbraSearch, SoftShadow, SoftShadowInputs, SoftShadowResources, SoftShadowSettings};
+pub(crate) use soft_shadow::{MAX_POINTS, MAX_TAPS};
+pub use soft_shadow::{
+    OccluderTest, PenumbraSearch, ShadowMethod, SoftShadow, SoftShadowInputs, SoftShadowResources, SoftShadowSettings,
+};
 pub use specular_paths::{PathShape, SpecularPaths, SpecularPathsInputs, SpecularPathsResources};
 pub use tone_map::{ToneCurve, ToneMap, ToneMapInputs, ToneMapResources, ToneMapSettings};
 pub use trace_statistics::{HopStatistics, TraceStatistics, TraceStatisticsInputs, TraceStatisticsResources};

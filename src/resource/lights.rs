@@ -194,6 +194,14 @@ impl Lights {
         self.written.iter().map(|l| l.extent > 0.0)
     }
 
+    /// The lights written by number, those of most flux first.
+    pub(crate) fn by_flux(&self) -> Vec<usize> {
+        let flux = |l: &gpu::LightRecord| l.photon_flux.iter().sum::<f32>() * l.photon_count.max(1) as f32;
+        let mut order: Vec<_> = (0..self.written.len()).collect();
+        order.sort_by(|&a, &b| flux(&self.written[b]).total_cmp(&flux(&self.written[a])));
+        order
+    }
+
     /// Photons that the lights written emit in all.
     pub fn photon_count(&self) -> u32 {
         self.written.iter().map(|l| l.photon_count).sum()

@@ -5,21 +5,32 @@
 @group(0) @binding(2) var depth_texture: texture_2d<f32>;
 @group(0) @binding(3) var normal_texture: texture_2d<f32>;
 @group(0) @binding(4) var<storage, read> lights: array<Light>;
-@group(0) @binding(5) var radii: texture_2d<f32>;
-@group(0) @binding(6) var source: texture_2d<f32>;
-@group(0) @binding(7) var target_texture: texture_storage_2d<r32float, write>;
+@group(0) @binding(5) var<storage, read> list: TileList;
+@group(0) @binding(6) var radii: texture_2d<f32>;
+// Of the first axis distances to occluders, of the second visibility along the first; and marks
+@group(0) @binding(7) var source: texture_2d<f32>;
+@group(0) @binding(8) var target_texture: texture_storage_2d<r32float, write>;
 
 // 0: across the tilt, the first to run; 1: along it
 override AXIS: u32;
 
+// Visibility, or a mark.
+fn source_at(pixel: vec2u) -> f32 {
+    let value = textureLoad(source, pixel, 0).r;
+    return select(value, occlusion_visibility(value), AXIS == 0u);
+}
+
 // Mean of the visibility along an axis, weighted by the width of a disc: an occluder's straight edge across the axis then
 // shows as much of a disc-shaped lamp as is seen past it.
 fn blurred(light: Light, id: vec2u, own: f32) -> f32 {
-    let radius_across = textureLoad(radii, id, 0).r;
-    if own == NO_RECEIVER || radius_across <= 0.0 {
+    if own == NO_RECEIVER {
         return own;
     }
     let receiver = receiver_at(light, id);
+    let radius_across = penumbra_found(light, receiver, id);
+    if radius_across <= 0.0 {
+        return own;
+    }
     let line = line_along(receiver.position, receiver_axes(receiver)[AXIS]);
     let radius = line_radius(line, radius_across, params.max_radius);
     let step = 2.0 / f32(2u * params.blur_taps + 1u);
@@ -30,10 +41,10 @@ fn blurred(light: Light, id: vec2u, own: f32) -> f32 {
     for (var i = 0u; i <= 2u * params.blur_taps; i++) {
         let x = (f32(i) + 0.5 + phase) * step - 1.0;
         let pixel = line_pixel(line, x * radius);
-        if pixel.x < 0 {
+        if pixel.x < 0 || pixel_distance(id, pixel) > params.max_radius {
             continue;
         }
-        let seen = textureLoad(source, pixel, 0).r;
+        let seen = source_at(vec2u(pixel));
         if seen == NO_RECEIVER {
             continue;
         }
@@ -44,14 +55,19 @@ fn blurred(light: Light, id: vec2u, own: f32) -> f32 {
 }
 
 @compute @workgroup_size(8, 8)
-fn blur_pixels(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= view.size) {
+fn blur_pixels(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_id) local: vec3u,
+) {
+    let id = tile_list_pixel(group, groups, local);
+    if any(id >= view.size) {
         return;
     }
-    var visibility = blurred(lights[params.light], id.xy, textureLoad(source, id.xy, 0).r);
+    var visibility = blurred(lights[params.light], id, source_at(id));
     if AXIS == 1u {
         // Marks end here, and so does what rounding left outside.
         visibility = clamp(visibility, 0.0, 1.0);
     }
-    textureStore(target_texture, id.xy, vec4f(visibility));
+    textureStore(target_texture, id, vec4f(visibility));
 }

@@ -7,32 +7,18 @@
 @group(0) @binding(4) var<storage, read> lights: array<Light>;
 @group(0) @binding(5) var<storage, read> nearest: array<f32>;
 @group(0) @binding(6) var occlusion: texture_2d<f32>;
-@group(0) @binding(7) var radii: texture_storage_2d<r32float, write>;
+@group(0) @binding(7) var<storage, read> list: TileList;
+@group(0) @binding(8) var radii: texture_storage_2d<r32float, write>;
 
-const TILES: u32 = 8u;
-// No direction is further than 45 degrees from one of a cross's four arms. An arm this much longer than the search's
-// radius crosses every straight edge within the radius.
-const ARM_LENGTH: f32 = 1.41421356;
 // Weight of a tap from which no penumbra reaches the receiver, but from the same shadow's edge between its arm's stretch
 // and the next arm one may: it decides where nothing better was found, and changes nothing where something was.
 const STRETCH_WEIGHT: f32 = 0x1p-7;
-
-// Distance from the lamp of the nearest thing that may shade the receiver, or beyond the receiver where there is none.
-fn nearest_occluder(light: Light, receiver: Receiver) -> f32 {
-    let ray = light_ray_to(light, receiver.position);
-    if any(ray.uv < vec2f(0.0)) || any(ray.uv > vec2f(1.0)) {
-        return receiver.distance;
-    }
-    let tile = cube_face_texel(ray.uv, TILES);
-    return nearest[((params.layer_count + ray.layer) * TILES + tile.y) * TILES + tile.x];
-}
 
 // The penumbra's radius across the light, or 0 where no occluder's penumbra reaches the receiver. A tap's occluder hides
 // part of the lamp from the receiver exactly if the tap lies within its own penumbra's radius (Eq. 5) of the receiver, so
 // that a search too wide takes in nothing that does not matter.
 fn penumbra_radius(light: Light, receiver: Receiver, own_gap: f32, id: vec2u) -> f32 {
-    let far_gap = receiver.distance - nearest_occluder(light, receiver);
-    let reach = ARM_LENGTH * shadow_penumbra_radius(light, receiver.distance, far_gap);
+    let reach = reach_radius(light, receiver);
     // Gap times weight, weight
     var sum = select(vec2f(0.0), vec2f(own_gap, 1.0), own_gap >= 0.0);
     let axes = receiver_axes(receiver);
@@ -42,7 +28,7 @@ fn penumbra_radius(light: Light, receiver: Receiver, own_gap: f32, id: vec2u) ->
     for (var arm = 0u; arm < 4u; arm++) {
         let angle = turn + 0.5 * SAMPLING_PI * f32(arm);
         let line = line_along(receiver.position, cos(angle) * axes[0] + sin(angle) * axes[1]);
-        let length = line_radius(line, reach, ARM_LENGTH * params.max_radius);
+        let length = line_radius(line, reach, reach_most_pixels());
         let arm_phase = fract(phase + 0.25 * f32(arm));
         for (var i = 0u; i < params.search_taps; i++) {
             // Taps are as dense as penumbrae are narrow: the arm's stretches grow linearly. Where in its stretch a tap
@@ -52,7 +38,7 @@ fn penumbra_radius(light: Light, receiver: Receiver, own_gap: f32, id: vec2u) ->
             let share = vec2f(f32(i), f32(i) + 1.0 - back) / count;
             let along = length * share * share;
             let pixel = line_pixel(line, along.y);
-            if pixel.x < 0 {
+            if pixel.x < 0 || pixel_distance(id, pixel) > reach_most_pixels() {
                 continue;
             }
             let gap = textureLoad(occlusion, pixel, 0).r;
@@ -75,15 +61,20 @@ fn penumbra_radius(light: Light, receiver: Receiver, own_gap: f32, id: vec2u) ->
 }
 
 @compute @workgroup_size(8, 8)
-fn search_pixels(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= view.size) {
+fn search_pixels(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_id) local: vec3u,
+) {
+    let id = tile_list_pixel(group, groups, local);
+    if any(id >= view.size) {
         return;
     }
-    let gap = textureLoad(occlusion, id.xy, 0).r;
+    let gap = textureLoad(occlusion, id, 0).r;
     if gap == NO_RECEIVER {
-        textureStore(radii, id.xy, vec4f(0.0));
+        textureStore(radii, id, vec4f(0.0));
         return;
     }
     let light = lights[params.light];
-    textureStore(radii, id.xy, vec4f(penumbra_radius(light, receiver_at(light, id.xy), gap, id.xy)));
+    textureStore(radii, id, vec4f(penumbra_radius(light, receiver_at(light, id), gap, id)));
 }

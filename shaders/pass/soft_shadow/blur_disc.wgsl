@@ -1,0 +1,58 @@
+// Mean visibility over the penumbra's ellipse on the receiver, by points spread over all of it.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> view: View;
+@group(0) @binding(2) var depth_texture: texture_2d<f32>;
+@group(0) @binding(3) var normal_texture: texture_2d<f32>;
+@group(0) @binding(4) var<storage, read> lights: array<Light>;
+@group(0) @binding(5) var<storage, read> list: TileList;
+@group(0) @binding(6) var radii: texture_2d<f32>;
+@group(0) @binding(7) var occlusion: texture_2d<f32>;
+@group(0) @binding(8) var visibility: texture_storage_2d<r32float, write>;
+
+fn gathered(light: Light, id: vec2u, own: f32) -> f32 {
+    let receiver = receiver_at(light, id);
+    let radius_across = penumbra_found(light, receiver, id);
+    if radius_across <= 0.0 {
+        return own;
+    }
+    let axes = receiver_axes(receiver);
+    let lines = array(line_along(receiver.position, axes[0]), line_along(receiver.position, axes[1]));
+    let radius = vec2f(
+        line_radius(lines[0], radius_across, params.max_radius),
+        line_radius(lines[1], radius_across, params.max_radius),
+    );
+    let turn = pixel_phase(id);
+    var sum = vec2f(0.0);
+    for (var i = 0u; i < params.disc_taps; i++) {
+        let at = radius * disc_point(i, params.disc_taps, turn);
+        let pixel = line_pixel(Line(lines[0].start + at.x * lines[0].step, lines[1].step), at.y);
+        if pixel.x < 0 || pixel_distance(id, pixel) > params.max_radius {
+            continue;
+        }
+        let seen = occlusion_visibility(textureLoad(occlusion, pixel, 0).r);
+        if seen == NO_RECEIVER {
+            continue;
+        }
+        sum += vec2f(seen, 1.0) * receiver_range_weight(receiver, vec2u(pixel), radius_across);
+    }
+    return select(own, sum.x / sum.y, sum.y > 0.0);
+}
+
+@compute @workgroup_size(8, 8)
+fn gather_pixels(
+    @builtin(workgroup_id) group: vec3u,
+    @builtin(num_workgroups) groups: vec3u,
+    @builtin(local_invocation_id) local: vec3u,
+) {
+    let id = tile_list_pixel(group, groups, local);
+    if any(id >= view.size) {
+        return;
+    }
+    let own = occlusion_visibility(textureLoad(occlusion, id, 0).r);
+    var seen = 0.0;
+    if own != NO_RECEIVER {
+        seen = clamp(gathered(lights[params.light], id, own), 0.0, 1.0);
+    }
+    textureStore(visibility, id, vec4f(seen));
+}
