@@ -496,8 +496,10 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         #[cfg(feature = "bvh")]
         "SoftShadow test by triangles" => vec![&soft_shadow::gather::TEST_SLOTS, &bvh_geometry::BVH_SLOTS],
         "SoftShadow list" => vec![&soft_shadow::gather::LIST_SLOTS],
-        "SoftShadow search" => vec![&soft_shadow::gather::SEARCH_SLOTS],
-        "SoftShadow blur" | "SoftShadow disc" => vec![&soft_shadow::gather::BLUR_SLOTS],
+        "SoftShadow search" => vec![&soft_shadow::gather::SEARCH_SLOTS, &soft_shadow::gather::MAP_SLOTS],
+        "SoftShadow blur" | "SoftShadow disc" => {
+            vec![&soft_shadow::gather::BLUR_SLOTS, &soft_shadow::gather::MAP_SLOTS]
+        }
         "SoftShadow filter" => vec![&soft_shadow::filter::FILTER_SLOTS, &soft_shadow::gather::MAP_SLOTS],
         #[cfg(feature = "bvh")]
         "SoftShadow trace" => vec![&soft_shadow::trace::TRACE_SLOTS, &bvh_geometry::BVH_SLOTS],

@@ -513,6 +513,7 @@ pub(crate) const SOFT_SHADOW_LIST: &str = compose![
 
 pub(crate) const SOFT_SHADOW_SEARCH: &str = compose![
     "pass/soft_shadow/search_occluders.wgsl",
+    "pass/soft_shadow/test_by_maps.wgsl",
     "pass/soft_shadow/reach.wgsl",
     "pass/soft_shadow/tile_list_pixel.wgsl",
     "pass/soft_shadow/tiles.wgsl",
@@ -531,7 +532,9 @@ pub(crate) const SOFT_SHADOW_SEARCH: &str = compose![
 
 pub(crate) const SOFT_SHADOW_BLUR: &str = compose![
     "pass/soft_shadow/blur_axis.wgsl",
-    "pass/soft_shadow/penumbra_found.wgsl",
+    "pass/soft_shadow/blur.wgsl",
+    "pass/soft_shadow/disc.wgsl",
+    "pass/soft_shadow/test_by_maps.wgsl",
     "pass/soft_shadow/tile_list_pixel.wgsl",
     "pass/soft_shadow/tiles.wgsl",
     "pass/soft_shadow/plane.wgsl",
@@ -548,7 +551,8 @@ pub(crate) const SOFT_SHADOW_BLUR: &str = compose![
 
 pub(crate) const SOFT_SHADOW_DISC: &str = compose![
     "pass/soft_shadow/blur_disc.wgsl",
-    "pass/soft_shadow/penumbra_found.wgsl",
+    "pass/soft_shadow/blur.wgsl",
+    "pass/soft_shadow/test_by_maps.wgsl",
     "pass/soft_shadow/disc.wgsl",
     "pass/soft_shadow/tile_list_pixel.wgsl",
     "pass/soft_shadow/tiles.wgsl",

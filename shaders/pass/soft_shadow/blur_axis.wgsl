@@ -31,27 +31,43 @@ fn blurred(light: Light, id: vec2u, own: f32) -> f32 {
     if radius_across <= 0.0 {
         return own;
     }
-    let line = line_along(receiver.position, receiver_axes(receiver)[AXIS]);
+    let axes = receiver_axes(receiver);
+    let line = line_along(receiver.position, axes[AXIS]);
     let radius = line_radius(line, radius_across, params.max_radius);
-    let step = 2.0 / f32(2u * params.blur_taps + 1u);
+    let taps = 2u * params.blur_taps + 1u;
+    let step = 2.0 / f32(taps);
     // Taps a pixel or more apart would show as so many copies of an edge: each pixel takes another place in each step.
     let dither = clamp(2.0 * radius * line_pixels(line) * step - 1.0, 0.0, 1.0);
-    let phase = dither * (pixel_phase(select(id, id.yx, AXIS == 1u)) - 0.5);
+    let noise = pixel_phase(select(id, id.yx, AXIS == 1u));
+    let phase = dither * (noise - 0.5);
+    // Visibility times weight, weight
     var sum = vec2f(0.0);
-    for (var i = 0u; i <= 2u * params.blur_taps; i++) {
+    var is_whole = true;
+    for (var i = 0u; i < taps; i++) {
         let x = (f32(i) + 0.5 + phase) * step - 1.0;
+        let weight = sqrt(max(1.0 - x * x, 0.0));
         let pixel = line_pixel(line, x * radius);
-        if pixel.x < 0 || pixel_distance(id, pixel) > params.max_radius {
-            continue;
+        sum.y += weight;
+        if is_shown(receiver, radius_across, pixel, id) {
+            sum.x += source_at(vec2u(pixel)) * weight;
+        } else {
+            is_whole = false;
         }
-        let seen = source_at(vec2u(pixel));
-        if seen == NO_RECEIVER {
-            continue;
-        }
-        let weight = sqrt(max(1.0 - x * x, 0.0)) * receiver_range_weight(receiver, vec2u(pixel), radius_across);
-        sum += vec2f(seen, 1.0) * weight;
     }
-    return select(own, sum.x / sum.y, sum.y > 0.0);
+    for (var i = select(0u, taps, is_whole); i < taps; i++) {
+        let x = (f32(i) + 0.5 + phase) * step - 1.0;
+        if is_shown(receiver, radius_across, line_pixel(line, x * radius), id) {
+            continue;
+        }
+        let weight = sqrt(max(1.0 - x * x, 0.0));
+        var p = receiver.position + x * radius * axes[AXIS];
+        if AXIS == 1u {
+            // Nothing was blurred there: any point across will do, so that all of them together are the disc.
+            p += (2.0 * fract(f32(i) * DISC_GOLDEN + noise) - 1.0) * weight * radius_across * axes[0];
+        }
+        sum.x += visibility_by_maps(light, receiver, p) * weight;
+    }
+    return sum.x / sum.y;
 }
 
 @compute @workgroup_size(8, 8)

@@ -10,6 +10,15 @@
 @group(0) @binding(7) var occlusion: texture_2d<f32>;
 @group(0) @binding(8) var visibility: texture_storage_2d<r32float, write>;
 
+fn source_at(pixel: vec2u) -> f32 {
+    return occlusion_visibility(textureLoad(occlusion, pixel, 0).r);
+}
+
+// Of a point by its place along both axes.
+fn plane_pixel(lines: array<Line, 2>, at: vec2f) -> vec2i {
+    return line_pixel(Line(lines[0].start + at.x * lines[0].step, lines[1].step), at.y);
+}
+
 fn gathered(light: Light, id: vec2u, own: f32) -> f32 {
     let receiver = receiver_at(light, id);
     let radius_across = penumbra_found(light, receiver, id);
@@ -23,20 +32,23 @@ fn gathered(light: Light, id: vec2u, own: f32) -> f32 {
         line_radius(lines[1], radius_across, params.max_radius),
     );
     let turn = pixel_phase(id);
-    var sum = vec2f(0.0);
+    var sum = 0.0;
+    var is_whole = true;
     for (var i = 0u; i < params.disc_taps; i++) {
-        let at = radius * disc_point(i, params.disc_taps, turn);
-        let pixel = line_pixel(Line(lines[0].start + at.x * lines[0].step, lines[1].step), at.y);
-        if pixel.x < 0 || pixel_distance(id, pixel) > params.max_radius {
-            continue;
+        let pixel = plane_pixel(lines, radius * disc_point(i, params.disc_taps, turn));
+        if is_shown(receiver, radius_across, pixel, id) {
+            sum += source_at(vec2u(pixel));
+        } else {
+            is_whole = false;
         }
-        let seen = occlusion_visibility(textureLoad(occlusion, pixel, 0).r);
-        if seen == NO_RECEIVER {
-            continue;
-        }
-        sum += vec2f(seen, 1.0) * receiver_range_weight(receiver, vec2u(pixel), radius_across);
     }
-    return select(own, sum.x / sum.y, sum.y > 0.0);
+    for (var i = select(0u, params.disc_taps, is_whole); i < params.disc_taps; i++) {
+        let at = radius * disc_point(i, params.disc_taps, turn);
+        if !is_shown(receiver, radius_across, plane_pixel(lines, at), id) {
+            sum += visibility_by_maps(light, receiver, receiver.position + at.x * axes[0] + at.y * axes[1]);
+        }
+    }
+    return sum / f32(params.disc_taps);
 }
 
 @compute @workgroup_size(8, 8)
@@ -49,7 +61,7 @@ fn gather_pixels(
     if any(id >= view.size) {
         return;
     }
-    let own = occlusion_visibility(textureLoad(occlusion, id, 0).r);
+    let own = source_at(id);
     var seen = 0.0;
     if own != NO_RECEIVER {
         seen = clamp(gathered(lights[params.light], id, own), 0.0, 1.0);

@@ -21,8 +21,10 @@ fn radius_found(light: Light, receiver: Receiver, axes: array<vec3f, 2>, turn: f
         let share = (f32(i) + 0.5) / f32(count);
         let at = sqrt(share) * disc_point(i, count, turn);
         let p = receiver.position + reach * (at.x * axes[0] + at.y * axes[1]);
-        let gap = gap_by_maps(light, p, receiver.normal);
-        if gap < 0.0 {
+        let point_gap = gap_by_maps(light, p, receiver.normal);
+        // Of the same occluder from the receiver; one beyond it hides nothing.
+        let gap = point_gap + receiver.distance - receiver_distance(light, p);
+        if point_gap < 0.0 || gap <= 0.0 {
             continue;
         }
         let radius = max(shadow_penumbra_radius(light, receiver.distance, gap), 0x1p-60);

@@ -1,4 +1,4 @@
-// The way from the receiver's plane to pixels, and what the pixels there say: what the gather in image space shares.
+// The way from the receiver's plane to pixels, and whether they show it: what the gather in image space shares.
 
 // In the textures of occluder distances and of visibility: not a surface, or one that faces away from the light.
 const NO_RECEIVER: f32 = -2.0;
@@ -48,12 +48,9 @@ fn pixel_distance(a: vec2u, b: vec2i) -> f32 {
     return max(away.x, away.y);
 }
 
-// Weight of the surface at another pixel: how far it lies from the receiver's plane, against the penumbra's radius. Zero
-// distance on a plane, however wide the penumbra, so that only other surfaces are left out.
-fn receiver_range_weight(receiver: Receiver, tap: vec2u, radius: f32) -> f32 {
-    let off_plane = dot(receiver.normal, receiver_position(tap) - receiver.position);
-    let width = params.range_scale * radius + PLANE_TOLERANCE;
-    return exp(-off_plane * off_plane / (width * width));
+// Whether a point is on the receiver's plane, as far as this length allows.
+fn receiver_is_coplanar(receiver: Receiver, tap: vec3f, length: f32) -> bool {
+    return abs(dot(receiver.normal, tap - receiver.position)) <= params.range_scale * length + PLANE_TOLERANCE;
 }
 
 // A number in [0, 1) for each pixel that is spread evenly over the pixels around any (Jimenez 2014, interleaved gradient

@@ -17,7 +17,8 @@ fn nearest_occluder(light: Light, receiver: Receiver) -> f32 {
 // How far from the receiver, across the light, a shadow may begin or end that reaches it.
 fn reach_radius(light: Light, receiver: Receiver) -> f32 {
     if params.search == 0u {
-        return receiver_one_radius(light, receiver);
+        // The blur covers a square around the ellipse.
+        return ARM_LENGTH * receiver_one_radius(light, receiver);
     }
     let far_gap = receiver.distance - nearest_occluder(light, receiver);
     return ARM_LENGTH * shadow_penumbra_radius(light, receiver.distance, far_gap);

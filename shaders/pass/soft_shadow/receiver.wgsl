@@ -37,15 +37,20 @@ fn receiver_position(id: vec2u) -> vec3f {
     return g_buffer_position(view, vec2f(id), textureLoad(depth_texture, id + view.origin, 0).r);
 }
 
+// Along the light's ray.
+fn receiver_distance(light: Light, p: vec3f) -> f32 {
+    if light.kind == LIGHT_DIRECTIONAL {
+        return dot(p, light.direction) + SURFACE_TEXEL_PARALLEL_START;
+    }
+    return length(light.position - p);
+}
+
 fn receiver_at(light: Light, id: vec2u) -> Receiver {
     let p = receiver_position(id);
     let n = g_buffer_normal(view, textureLoad(normal_texture, id + view.origin, 0));
-    if light.kind == LIGHT_DIRECTIONAL {
-        return Receiver(p, n, -light.direction, dot(p, light.direction) + SURFACE_TEXEL_PARALLEL_START);
-    }
-    let to_light = light.position - p;
-    let distance = length(to_light);
-    return Receiver(p, n, to_light / max(distance, 0x1p-60), distance);
+    let distance = receiver_distance(light, p);
+    let to_light = (light.position - p) / max(distance, 0x1p-60);
+    return Receiver(p, n, select(to_light, -light.direction, light.kind == LIGHT_DIRECTIONAL), distance);
 }
 
 // Where the penumbra's radius across the light points on the receiver's plane: unchanged across the tilt, stretched along

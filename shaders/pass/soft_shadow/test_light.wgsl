@@ -18,32 +18,38 @@
 var<workgroup> holds: atomic<u32>;
 var<workgroup> reach_bits: atomic<u32>;
 
-// Distance from receiver to occluder, or a mark.
-fn gap_at(light: Light, receiver: Receiver, id: vec2u) -> f32 {
-    let is_seen = textureLoad(base_color_texture, id + view.origin, 0).a > 0.0;
-    if !is_seen || !receiver_faces(light, receiver) {
-        return NO_RECEIVER;
-    }
-    return occluder_gap(light, receiver);
+fn is_receiver(light: Light, receiver: Receiver, id: vec2u) -> bool {
+    return textureLoad(base_color_texture, id + view.origin, 0).a > 0.0 && receiver_faces(light, receiver);
 }
 
-// How far the search, and the blur, of this receiver go: the corners of what they stay within.
-fn reach_pixels(light: Light, receiver: Receiver, id: vec2u) -> f32 {
-    let radius = reach_radius(light, receiver);
-    let axes = receiver_axes(receiver);
-    var most = 0.0;
-    for (var corner = 0u; corner < 4u; corner++) {
-        let signs = vec2f(select(-1.0, 1.0, (corner & 1u) == 0u), select(-1.0, 1.0, corner < 2u));
-        let at = receiver.position + radius * (signs.x * axes[0] + signs.y * axes[1]);
-        let clip = view.view_projection * vec4f(at, 1.0);
-        if !(clip.w > 0.0) {
-            return reach_most_pixels();
-        }
-        let pixel = (vec2f(0.5, 0.5) + vec2f(0.5, -0.5) * (clip.xy / clip.w)) * vec2f(view.size);
-        let away = abs(pixel - vec2f(id) - 0.5);
-        most = max(most, max(away.x, away.y));
+// How far the receivers of a tile reach, by eight of its pixels, one in each row and column: between them a surface has little
+// room to reach further than the search's arms have to spare.
+fn sample_reach(light: Light, tile: vec2u, sample: u32) {
+    let id = 8u * tile + vec2u(sample, (5u * sample + 2u) % 8u);
+    if any(id >= view.size) {
+        return;
     }
-    return min(most, reach_most_pixels());
+    let receiver = receiver_at(light, id);
+    if is_receiver(light, receiver, id) {
+        atomicMax(&reach_bits, bitcast<u32>(reach_pixels(light, receiver, id)));
+    }
+}
+
+// How far the search and the blur of this receiver go, in pixels: no end of the ellipse that they stay within is further away. A
+// step of a length along any direction changes clip coordinates by no more than the length of their row of the matrix.
+fn reach_pixels(light: Light, receiver: Receiver, id: vec2u) -> f32 {
+    let cosine = max(dot(receiver.normal, receiver.to_light), LEAST_COSINE);
+    let longest = reach_radius(light, receiver) / cosine;
+    let rows = vec3f(
+        length(g_buffer_row(view, 0u).xyz),
+        length(g_buffer_row(view, 1u).xyz),
+        length(g_buffer_row(view, 3u).xyz),
+    );
+    let w = dot(g_buffer_row(view, 3u), vec4f(receiver.position, 1.0)) - longest * rows.z;
+    let ndc = abs(2.0 * (vec2f(id) + 0.5) / vec2f(view.size) - 1.0);
+    let away = longest * (rows.xy + ndc * rows.z) * 0.5 * vec2f(view.size);
+    // Not beyond what taps are taken from, nor where the eye's plane may be within reach.
+    return select(reach_most_pixels(), min(max(away.x, away.y) / w, reach_most_pixels()), w > 0.0);
 }
 
 @compute @workgroup_size(8, 8)
@@ -53,10 +59,13 @@ fn test_pixels(
     @builtin(num_workgroups) tile_counts: vec3u,
     @builtin(local_invocation_index) lane: u32,
 ) {
+    let light = lights[params.light];
     if all(id.xy < view.size) {
-        let light = lights[params.light];
         let receiver = receiver_at(light, id.xy);
-        let gap = gap_at(light, receiver, id.xy);
+        var gap = NO_RECEIVER;
+        if is_receiver(light, receiver, id.xy) {
+            gap = occluder_gap(light, receiver);
+        }
         let is_lit = gap == NO_OCCLUDER;
         textureStore(visibility, id.xy, vec4f(select(0.0, 1.0, is_lit)));
         if params.is_gathered == 1u {
@@ -65,9 +74,11 @@ fn test_pixels(
             textureStore(across, id.xy, vec4f(marked));
             if gap != NO_RECEIVER {
                 atomicOr(&holds, select(TILE_HOLDS_SHADOW, TILE_HOLDS_LIGHT, is_lit));
-                atomicMax(&reach_bits, bitcast<u32>(reach_pixels(light, receiver, id.xy)));
             }
         }
+    }
+    if lane < 8u && params.is_gathered == 1u {
+        sample_reach(light, tile.xy, lane);
     }
     workgroupBarrier();
     if lane == 0u && params.is_gathered == 1u {

@@ -150,43 +150,43 @@ fn pipeline(
     device::compute_pipeline(device, &spec)
 }
 
-impl Step {
-    fn new(device: &wgpu::Device, label: &'static str, shader: (&'static str, &'static str), slots: &[Slot]) -> Self {
-        let layout = layout(device, label, slots);
-        let pipeline = pipeline(device, label, shader, &[&layout], &[]);
-        Self { layout, pipeline }
-    }
-}
-
 impl Penumbra {
-    fn new(device: &wgpu::Device) -> Self {
+    fn new(device: &wgpu::Device, map_layout: &wgpu::BindGroupLayout) -> Self {
+        let list_layout = layout(device, "lightfall::SoftShadow::list", &LIST_SLOTS);
+        let search_layout = layout(device, "lightfall::SoftShadow::search", &SEARCH_SLOTS);
         let blur_layout = layout(device, "lightfall::SoftShadow::blur", &BLUR_SLOTS);
-        let axis = |label, axis| {
-            let shader = (wgsl::SOFT_SHADOW_BLUR, "blur_pixels");
-            pipeline(device, label, shader, &[&blur_layout], &[("AXIS", axis)])
+        let blur = |label, shader, constants: &[(&str, f64)]| {
+            pipeline(device, label, shader, &[&blur_layout, map_layout], constants)
         };
+        let axis = |label, axis| blur(label, (wgsl::SOFT_SHADOW_BLUR, "blur_pixels"), &[("AXIS", axis)]);
         Self {
-            list: Step::new(
-                device,
-                "lightfall::SoftShadow::list",
-                (wgsl::SOFT_SHADOW_LIST, "list_tiles"),
-                &LIST_SLOTS,
-            ),
-            search: Step::new(
-                device,
-                "lightfall::SoftShadow::search",
-                (wgsl::SOFT_SHADOW_SEARCH, "search_pixels"),
-                &SEARCH_SLOTS,
-            ),
+            list: Step {
+                pipeline: pipeline(
+                    device,
+                    "lightfall::SoftShadow::list",
+                    (wgsl::SOFT_SHADOW_LIST, "list_tiles"),
+                    &[&list_layout],
+                    &[],
+                ),
+                layout: list_layout,
+            },
+            search: Step {
+                pipeline: pipeline(
+                    device,
+                    "lightfall::SoftShadow::search",
+                    (wgsl::SOFT_SHADOW_SEARCH, "search_pixels"),
+                    &[&search_layout, map_layout],
+                    &[],
+                ),
+                layout: search_layout,
+            },
             axes: [
                 axis("lightfall::SoftShadow::blur_across", 0.0),
                 axis("lightfall::SoftShadow::blur_along", 1.0),
             ],
-            disc: pipeline(
-                device,
+            disc: blur(
                 "lightfall::SoftShadow::blur_disc",
                 (wgsl::SOFT_SHADOW_DISC, "gather_pixels"),
-                &[&blur_layout],
                 &[],
             ),
             blur_layout,
@@ -225,12 +225,24 @@ impl Gather {
         if light.settings.method == ShadowMethod::Hard {
             return;
         }
-        let penumbra = self.penumbra.get_or_init(|| Penumbra::new(device));
+        let penumbra = self.penumbra.get_or_init(|| Penumbra::new(device, &self.map_layout));
+        let maps = self.maps(device, buffers, inputs);
         penumbra.record_list(device, encoder, buffers, inputs);
         if light.settings.search == PenumbraSearch::On {
-            penumbra.record_search(device, encoder, buffers, inputs, light);
+            penumbra.record_search(device, encoder, buffers, (inputs, light, &maps));
         }
-        penumbra.record_blur(device, encoder, buffers, inputs, light);
+        penumbra.record_blur(device, encoder, buffers, (inputs, light, &maps));
+    }
+
+    fn maps(
+        &self,
+        device: &wgpu::Device,
+        buffers: &mut GatherBuffers,
+        inputs: &SoftShadowInputs<'_>,
+    ) -> wgpu::BindGroup {
+        let bound = [inputs.shadow_maps.view().into()];
+        let label = "lightfall::SoftShadow::maps";
+        buffers.map_groups.get(device, label, &self.map_layout, &bound)
     }
 
     fn record_test(
@@ -285,10 +297,7 @@ impl Gather {
             return (self.test_by_triangles.get_or_init(pipeline), group);
         }
         debug_assert_eq!(light.settings.test, OccluderTest::ShadowMaps);
-        let bound = [inputs.shadow_maps.view().into()];
-        let label = "lightfall::SoftShadow::maps";
-        let group = buffers.map_groups.get(device, label, &self.map_layout, &bound);
-        (&self.test, group)
+        (&self.test, self.maps(device, buffers, inputs))
     }
 }
 
@@ -320,8 +329,7 @@ impl Penumbra {
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
         buffers: &mut GatherBuffers,
-        inputs: &SoftShadowInputs<'_>,
-        light: &OneLight<'_>,
+        (inputs, light, maps): (&SoftShadowInputs<'_>, &OneLight<'_>, &wgpu::BindGroup),
     ) {
         let views = inputs.g_buffer.views();
         let bound = [
@@ -340,6 +348,7 @@ impl Penumbra {
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.search.pipeline);
         pass.set_bind_group(0, &group, &[]);
+        pass.set_bind_group(1, maps, &[]);
         pass.dispatch_workgroups_indirect(&buffers.list, 0);
     }
 
@@ -348,8 +357,7 @@ impl Penumbra {
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
         buffers: &mut GatherBuffers,
-        inputs: &SoftShadowInputs<'_>,
-        light: &OneLight<'_>,
+        (inputs, light, maps): (&SoftShadowInputs<'_>, &OneLight<'_>, &wgpu::BindGroup),
     ) {
         let views = inputs.g_buffer.views();
         let label = "lightfall::SoftShadow::blur";
@@ -384,6 +392,7 @@ impl Penumbra {
         for (pipeline, group) in &steps {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, group, &[]);
+            pass.set_bind_group(1, maps, &[]);
             pass.dispatch_workgroups_indirect(list, 0);
         }
     }
