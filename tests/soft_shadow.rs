@@ -96,14 +96,14 @@ struct Rendered {
 }
 
 fn render(gpu: &Gpu, scene: &Scene, settings: &SoftShadowSettings, size: u32, map_size: u32) -> Rendered {
-    render_by(gpu, scene, settings, size, map_size, None)
+    render_by(gpu, scene, std::slice::from_ref(settings), size, map_size, None)
 }
 
 /// As [`render`]; `given` lights the surfaces instead of what was gathered.
 fn render_by(
     gpu: &Gpu,
     scene: &Scene,
-    settings: &SoftShadowSettings,
+    settings: &[SoftShadowSettings],
     size: u32,
     map_size: u32,
     given: Option<&Visibility>,
@@ -160,7 +160,7 @@ fn render_by(
     };
     GBufferCapture::new().record(&mut encoder, &mut g_buffer, &g_buffer_inputs);
     let light_count = scene.lights.len() as u32;
-    let bvh = settings.uses_triangles().then(|| {
+    let bvh = settings.iter().any(SoftShadowSettings::uses_triangles).then(|| {
         let mut bvh = BvhGeometry::new(device, queue, scene, &BvhGeometryConfig::default()).unwrap();
         bvh.prepare(queue, &frame).unwrap();
         bvh
@@ -174,7 +174,7 @@ fn render_by(
         nearest: &nearest,
         bvh: bvh.as_ref(),
         visibility: &visibility,
-        settings: std::slice::from_ref(settings),
+        settings,
         sample_offset: 0,
         timestamps,
     };
@@ -736,7 +736,7 @@ fn a_hosts_own_visibility_counts_like_the_crates() {
     let visibility = Visibility::from_view(&texture.create_view(&Default::default())).unwrap();
     assert_eq!((visibility.lights(), visibility.memory_use()), (1, 0));
     assert!(visibility.layer_view(0).is_none(), "it cannot be written");
-    let given = render_by(&gpu, &scene, &FOUR_PLUS_FIVE(), SIZE, 256, Some(&visibility));
+    let given = render_by(&gpu, &scene, &[FOUR_PLUS_FIVE()], SIZE, 256, Some(&visibility));
     let is_half = |(given, own): (&[f32; 4], &[f32; 4])| (0..3).all(|c| given[c] == 0.5 * own[c]);
     assert!(given.by_layers.iter().zip(&own.by_layers).all(is_half));
     assert_no_errors(&gpu);
@@ -858,5 +858,144 @@ fn the_renderer_gathers_soft_shadows_only_where_a_light_has_an_extent() {
     assert_eq!(frame(&mut offline), (hard_passes, 0));
     assert_eq!(bytes(&offline), hard.1);
     assert!(offline.read().unwrap() == hard.0);
+    assert_no_errors(&gpu);
+}
+
+fn by(method: ShadowMethod) -> SoftShadowSettings {
+    SoftShadowSettings {
+        method,
+        ..Default::default()
+    }
+}
+
+#[test]
+fn rays_to_a_lamp_bring_the_share_of_its_light_that_arrives() {
+    let Some(gpu) = gpu() else { return };
+    let rays = SoftShadowSettings {
+        rays: 256,
+        ..by(ShadowMethod::Rays)
+    };
+    let scene = two_plates(LAMP_RADIUS);
+    let disc = truth_image(&scene.cameras[0], LAMP_RADIUS, 18);
+    // A rectangle: light arrives by both cosines over the squared distance.
+    let lamp = DVec3::from(LAMP);
+    let (half_u, half_v) = (0.3 * DVec3::X, 0.15 * DVec3::Z);
+    let mut flat = scene.clone();
+    flat.lights[0].kind = LightKind::Rectangle {
+        center: lamp,
+        half_u,
+        half_v,
+    };
+    let side = 24;
+    let rectangle: Vec<f64> = (0..SIZE * SIZE)
+        .map(|i| {
+            let p = floor_point(&scene.cameras[0], SIZE, i % SIZE, i / SIZE);
+            let at = |k: u32| (2.0 * f64::from(k) + 1.0) / f64::from(side) - 1.0;
+            let (mut seen, mut all) = (0.0, 0.0);
+            for k in 0..side * side {
+                let ray = lamp + at(k % side) * half_u + at(k / side) * half_v - p;
+                let light = (ray.y / ray.length_squared()).powi(2);
+                all += light;
+                seen += if PLATES.iter().any(|plate| crosses(p, ray, plate)) {
+                    0.0
+                } else {
+                    light
+                };
+            }
+            seen / all
+        })
+        .collect();
+    // A straight edge leaves an error of some 256^-3/4 = 0.016 in the penumbra, a quarter of the picture, and the truths have
+    // as much.
+    for (name, scene, truth) in [("disc", &scene, &disc), ("rectangle", &flat, &rectangle)] {
+        let error = rmse(&render(&gpu, scene, &rays, SIZE, 256).layers[0], truth);
+        println!("{name}: RMSE {error:.4}");
+        assert!(error < 0.01, "{name}: {error}");
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn hard_shadows_are_those_of_a_point_and_exact_by_rays() {
+    let Some(gpu) = gpu() else { return };
+    let point = render(&gpu, &two_plates(0.0), &FOUR_PLUS_FIVE(), SIZE, 512);
+    let lamp = render(&gpu, &two_plates(LAMP_RADIUS), &by(ShadowMethod::Hard), SIZE, 512);
+    assert_eq!(lamp.passes, 1);
+    assert!(lamp.layers == point.layers && lamp.by_layers == point.by_layers);
+    let by_rays = SoftShadowSettings {
+        test: OccluderTest::Triangles,
+        ..by(ShadowMethod::Hard)
+    };
+    let exact = render(&gpu, &two_plates(LAMP_RADIUS), &by_rays, SIZE, 64);
+    let scene = two_plates(0.0);
+    let wrong = (0..SIZE * SIZE).zip(&exact.layers[0]).filter(|(i, v)| {
+        let p = floor_point(&scene.cameras[0], SIZE, i % SIZE, i / SIZE);
+        let ray = DVec3::from(LAMP) - p;
+        let is_lit = !PLATES.iter().any(|plate| crosses(p, ray, plate));
+        **v != if is_lit { 1.0 } else { 0.0 }
+    });
+    // The plate that stands on the floor has some of the points that the test looks at below it.
+    let wrong = wrong.count();
+    println!("{wrong} pixels differ from f64");
+    assert!(wrong <= 8, "{wrong}");
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn each_light_may_have_a_method_of_its_own() {
+    let Some(gpu) = gpu() else { return };
+    let mut scene = two_plates(LAMP_RADIUS);
+    let other = light(LightKind::Point {
+        position: DVec3::new(-0.5, 1.6, -0.4),
+        radius: 0.1,
+    });
+    scene.lights.push(other);
+    let methods = [ShadowMethod::Pcss, ShadowMethod::Hard];
+    let each = render_by(&gpu, &scene, &methods.map(by), SIZE, 256, None);
+    for (light, method) in methods.into_iter().enumerate() {
+        let alone = render(&gpu, &scene, &by(method), SIZE, 256);
+        assert!(each.layers[light] == alone.layers[light], "{method:?}");
+    }
+    // The last entry counts for lights beyond; none at all is hard.
+    let last = render_by(&gpu, &scene, &[by(ShadowMethod::Disc)], SIZE, 256, None);
+    assert!(
+        last.layers
+            .iter()
+            .all(|layer| layer.iter().any(|v| *v > 0.0 && *v < 1.0))
+    );
+    let none = render_by(&gpu, &scene, &[], SIZE, 256, None);
+    assert!(none.layers.iter().flatten().all(|v| [0.0, 1.0].contains(v)));
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn the_renderer_spends_on_the_brightest_lights_and_asks_for_triangles() {
+    let Some(gpu) = gpu() else { return };
+    let mut scene = samples::penumbra(0.0);
+    let mut dim = scene.lights[0].clone();
+    dim.intensity *= 0.25;
+    scene.lights.insert(0, dim);
+    let settings = |name: &str, value: &str| {
+        let mut settings = Settings {
+            bounces: 0,
+            shadow_map_size: 256,
+            ..Settings::balanced()
+        };
+        settings.set(name, value).unwrap();
+        settings
+    };
+    let layers = |settings: &Settings| {
+        let size = [SIZE, 64];
+        let mut offline = Offline::new(&gpu, scene.clone(), settings, 0, size, Component::Direct).unwrap();
+        offline.render_frame(None).unwrap();
+        let all = read_layers(&gpu, offline.view.visibility().unwrap());
+        let is_soft = |layer: &[f32]| layer.iter().any(|v| *v > 0.0 && *v < 1.0);
+        let pixels = (size[0] * size[1]) as usize;
+        [is_soft(&all[..pixels]), is_soft(&all[pixels..2 * pixels])]
+    };
+    assert_eq!(layers(&settings("soft_shadow.lights", "64")), [true, true]);
+    assert_eq!(layers(&settings("soft_shadow.lights", "1")), [false, true]);
+    assert_eq!(layers(&settings("soft_shadow.lights", "0")), [false, false]);
+    assert_eq!(layers(&settings("soft_shadow.method", "rays")), [true, true]);
     assert_no_errors(&gpu);
 }
