@@ -424,17 +424,18 @@ impl Study<'_> {
         columns.extend(sizes.map(|s| s.to_string()));
         let columns: Vec<_> = columns.iter().map(String::as_str).collect();
         self.head("Resolution of the shadow maps", &columns);
+        let ways = ["cross 4 + 5", "PCSS 16 + 16"];
         for Named { name, scene } in scenes::all() {
-            for by in ["cross 4 + 5", "PCSS 16 + 16"] {
-                let mut cells = vec![format!("{name}, {by}")];
-                for size in sizes {
-                    let mut bench = Bench::new(&self.gpu, &scene, self.arguments.size, size)?;
-                    let truth = bench.truth()?;
+            let truth = Bench::new(&self.gpu, &scene, self.arguments.size, sizes[0])?.truth()?;
+            let mut lines = ways.map(|way| vec![format!("{name}, {way}")]);
+            for size in sizes {
+                let mut bench = Bench::new(&self.gpu, &scene, self.arguments.size, size)?;
+                for (by, line) in ways.iter().zip(&mut lines) {
                     let [inside, outside] = errors(&bench.visibility(&way(by).settings)?, &truth);
-                    cells.push(format!("{inside:.3}, {outside:.3}"));
+                    line.push(format!("{inside:.3}, {outside:.3}"));
                 }
-                self.row(&cells);
             }
+            lines.iter().for_each(|line| self.row(line));
         }
         Ok(())
     }

@@ -60,12 +60,12 @@ fn blurred(light: Light, id: vec2u, own: f32) -> f32 {
             continue;
         }
         let weight = sqrt(max(1.0 - x * x, 0.0));
-        var p = receiver.position + x * radius * axes[AXIS];
+        var offset = x * radius * axes[AXIS];
         if AXIS == 1u {
             // Nothing was blurred there: any point across will do, so that all of them together are the disc.
-            p += (2.0 * fract(f32(i) * DISC_GOLDEN + noise) - 1.0) * weight * radius_across * axes[0];
+            offset += (2.0 * fract(f32(i) * DISC_GOLDEN + noise) - 1.0) * weight * radius_across * axes[0];
         }
-        sum.x += visibility_by_maps(light, receiver, p) * weight;
+        sum.x += visibility_by_maps(light, receiver, receiver_point(receiver, offset)) * weight;
     }
     return sum.x / sum.y;
 }

@@ -45,7 +45,8 @@ fn gathered(light: Light, id: vec2u, own: f32) -> f32 {
     for (var i = select(0u, params.disc_taps, is_whole); i < params.disc_taps; i++) {
         let at = radius * disc_point(i, params.disc_taps, turn);
         if !is_shown(receiver, radius_across, plane_pixel(lines, at), id) {
-            sum += visibility_by_maps(light, receiver, receiver.position + at.x * axes[0] + at.y * axes[1]);
+            let p = receiver_point(receiver, at.x * axes[0] + at.y * axes[1]);
+            sum += visibility_by_maps(light, receiver, p);
         }
     }
     return sum / f32(params.disc_taps);

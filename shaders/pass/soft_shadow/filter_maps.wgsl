@@ -20,7 +20,7 @@ fn radius_found(light: Light, receiver: Receiver, axes: array<vec3f, 2>, turn: f
         // Denser in the middle: taps are as dense as penumbrae are narrow.
         let share = (f32(i) + 0.5) / f32(count);
         let at = sqrt(share) * disc_point(i, count, turn);
-        let p = receiver.position + reach * (at.x * axes[0] + at.y * axes[1]);
+        let p = receiver_point(receiver, reach * (at.x * axes[0] + at.y * axes[1]));
         let point_gap = gap_by_maps(light, p, receiver.normal);
         // Of the same occluder from the receiver; one beyond it hides nothing.
         let gap = point_gap + receiver.distance - receiver_distance(light, p);
@@ -46,7 +46,7 @@ fn filtered(light: Light, receiver: Receiver, id: vec2u) -> f32 {
     var seen = 0.0;
     for (var i = 0u; i < params.disc_taps; i++) {
         let at = radius * disc_point(i, params.disc_taps, turn);
-        let p = receiver.position + at.x * axes[0] + at.y * axes[1];
+        let p = receiver_point(receiver, at.x * axes[0] + at.y * axes[1]);
         seen += select(0.0, 1.0, gap_by_maps(light, p, receiver.normal) < 0.0);
     }
     return seen / f32(params.disc_taps);

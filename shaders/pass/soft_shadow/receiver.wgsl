@@ -68,6 +68,15 @@ fn receiver_axes(receiver: Receiver) -> array<vec3f, 2> {
     return array(u, cross(receiver.normal, u) / cosine);
 }
 
+// What a G-buffer's normals may be off by, radians: the half of a step of 11 bits, twice over.
+const NORMAL_ERROR: f32 = 0x1p-10;
+
+// A point of the receiver's plane, lifted by as much as its normal may be off, or the plane's own surface would shade it where
+// light grazes.
+fn receiver_point(receiver: Receiver, offset: vec3f) -> vec3f {
+    return receiver.position + offset + (NORMAL_ERROR * length(offset)) * receiver.normal;
+}
+
 // Whether any of a light may reach the receiver: of a flat lamp, or a wide sun, a part may stand above the horizon where its
 // middle does not.
 fn receiver_faces(light: Light, receiver: Receiver) -> bool {

@@ -43,7 +43,7 @@ fn cross_tap(receiver: Receiver, cross: Cross, index: u32) -> Tap {
     let back = fract(cross.phase + 0.25 * f32(arm)) * (count - 1.0 - i) / count;
     let share = vec2f(i, i + 1.0 - back) / count;
     let along = length * share * share;
-    return Tap(receiver.position + along.y * axis, line_pixel(line, along.y), along);
+    return Tap(receiver_point(receiver, along.y * axis), line_pixel(line, along.y), along);
 }
 
 // Whether a tap's pixel shows its point.
