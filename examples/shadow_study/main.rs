@@ -497,7 +497,8 @@ impl Study<'_> {
             }
         }
         let mut bytes = std::io::Cursor::new(Vec::new());
-        sheet
+        image::DynamicImage::from(sheet)
+            .to_luma8()
             .write_to(&mut bytes, image::ImageFormat::Png)
             .map_err(|e| e.to_string())?;
         exr_file::replace_file(path, &bytes.into_inner())
