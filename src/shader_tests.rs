@@ -500,9 +500,9 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "SoftShadow blur" | "SoftShadow disc" => {
             vec![&soft_shadow::gather::BLUR_SLOTS, &soft_shadow::gather::MAP_SLOTS]
         }
-        "SoftShadow filter" => vec![&soft_shadow::filter::FILTER_SLOTS, &soft_shadow::gather::MAP_SLOTS],
+        "SoftShadow filter" => vec![&soft_shadow::over_pixels::PIXEL_SLOTS, &soft_shadow::gather::MAP_SLOTS],
         #[cfg(feature = "bvh")]
-        "SoftShadow trace" => vec![&soft_shadow::trace::TRACE_SLOTS, &bvh_geometry::BVH_SLOTS],
+        "SoftShadow trace" => vec![&soft_shadow::over_pixels::PIXEL_SLOTS, &bvh_geometry::BVH_SLOTS],
         "Upsampler" => vec![&upsampler::SLOTS],
         "Composite" => vec![&composite::SLOTS],
         "Accumulator" => vec![&accumulator::SLOTS],

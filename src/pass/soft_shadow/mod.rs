@@ -14,9 +14,9 @@
 //!   on the receiver's plane instead of the screen's, weighted as a disc-shaped lamp is, so that the straight edge of an occluder
 //!   parallel to the lamp has the exact profile V(x) = 1/2 + (x √(1 − x²) + asin x) / π, x in radii, of a `Cross` if it lies along
 //!   an axis, and its second moment anyhow.
-//! - *In the shadow maps* (`Pcf`, `Pcss`; `filter.rs`): the same radius and the same ellipse, but points of the receiver's plane
+//! - *In the shadow maps* (`Pcf`, `Pcss`; `over_pixels.rs`): the same radius and the same ellipse, but points of the receiver's plane
 //!   are tested in the shadow maps, whatever the eye sees there. Sources: Reeves, Salesin and Cook 1987; Fernando 2005.
-//! - *By rays* to points all over the lamp (`Rays`; `trace.rs`): the share of its light that comes unhindered.
+//! - *By rays* to points all over the lamp (`Rays`; `over_pixels.rs`): the share of its light that comes unhindered.
 //!
 //! Cost: pixels × lights with an extent × taps: of `Cross`, in listed tiles alone, 4 `search_taps` + 4 `blur_taps` + 2 of two
 //! fetches; of `Pcss` 4 `search_taps` + `disc_taps` tests; `docs/shadows.md` measures them.
@@ -27,21 +27,17 @@
 //! other; a spot's disc is taken to face the receiver, a flat lamp is the disc of its area; receivers tilted beyond 83° count as
 //! tilted so far.
 
-pub(crate) mod filter;
 pub(crate) mod gather;
-#[cfg(feature = "bvh")]
-pub(crate) mod trace;
+pub(crate) mod over_pixels;
 
 use crate::gpu::{self as device};
 #[cfg(feature = "bvh")]
-use crate::resource::BvhGeometry;
+use crate::resource::{BvhGeometry, bvh_geometry::BVH_SLOTS};
 use crate::resource::{GBuffer, Lights, NearestOccluders, ShadowMaps, Visibility};
-use crate::{Error, Timestamps};
-use filter::{Filter, FilterGroups};
-use gather::{Gather, GatherBuffers};
+use crate::{Error, Timestamps, wgsl};
+use gather::{Gather, GatherBuffers, MAP_SLOTS};
+use over_pixels::{OverPixels, OverPixelsGroups};
 use std::sync::OnceLock;
-#[cfg(feature = "bvh")]
-use trace::{Trace, TraceGroups};
 
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
@@ -133,9 +129,9 @@ pub struct SoftShadowSettings {
     /// Widest radius of a penumbra in image space, pixels. Higher lets large lamps cast penumbrae as wide as they are, with more
     /// grain and fetches further apart; lower cuts them.
     pub max_radius: f32,
-    /// How far from the receiver's plane another surface may lie and still count, as a share of the penumbra's radius (c of
-    /// σ = (c R)², where the paper has a fixed σ). Higher blurs across steps and around curves; lower leaves taps out and
-    /// grain in.
+    /// How far from the receiver's plane another surface may lie and still count, as a share of the penumbra's radius (where
+    /// the paper has a fixed σ); the shadow map is asked about points that no such surface shows. Higher blurs across steps and
+    /// around curves; lower asks the map more often.
     pub range_scale: f32,
 }
 
@@ -195,9 +191,9 @@ impl SoftShadowSettings {
 pub struct SoftShadow {
     device: wgpu::Device,
     gather: Gather,
-    filter: OnceLock<Filter>,
+    filter: OnceLock<OverPixels>,
     #[cfg(feature = "bvh")]
-    trace: OnceLock<Trace>,
+    trace: OnceLock<OverPixels>,
 }
 
 /// Uniforms, bind groups and textures that all lights share, for one view.
@@ -207,9 +203,9 @@ pub struct SoftShadowResources {
     params: Vec<wgpu::Buffer>,
     written: Vec<Option<gpu::Params>>,
     gather: GatherBuffers,
-    filter: FilterGroups,
+    filter: OverPixelsGroups,
     #[cfg(feature = "bvh")]
-    trace: TraceGroups,
+    trace: OverPixelsGroups,
 }
 
 /// What a frame gives it.
@@ -286,6 +282,17 @@ impl SoftShadow {
         }
     }
 
+    fn filter(&self) -> OverPixels {
+        let shader = (wgsl::SOFT_SHADOW_FILTER, "filter_pixels");
+        OverPixels::new(&self.device, "lightfall::SoftShadow::filter", shader, &MAP_SLOTS)
+    }
+
+    #[cfg(feature = "bvh")]
+    fn trace(&self) -> OverPixels {
+        let shader = (wgsl::SOFT_SHADOW_TRACE, "trace_pixels");
+        OverPixels::new(&self.device, "lightfall::SoftShadow::trace", shader, &BVH_SLOTS)
+    }
+
     /// Records the layer of every light: the hard test alone for those without extent.
     pub fn record(
         &self,
@@ -309,15 +316,18 @@ impl SoftShadow {
                         .record(&self.device, encoder, &mut resources.gather, inputs, &light);
                 }
                 ShadowMethod::Pcf | ShadowMethod::Pcss => {
-                    let filter = self.filter.get_or_init(|| Filter::new(&self.device));
-                    filter.record(&self.device, encoder, &mut resources.filter, inputs, &light);
+                    let filter = self.filter.get_or_init(|| self.filter());
+                    let occluders = [inputs.shadow_maps.view().into()];
+                    let read = (inputs.nearest.buffer(), &occluders[..]);
+                    filter.record(&self.device, encoder, &mut resources.filter, (inputs, &light), read);
                 }
                 ShadowMethod::Rays =>
                 {
                     #[cfg(feature = "bvh")]
                     if let Some(bvh) = inputs.bvh {
-                        let trace = self.trace.get_or_init(|| Trace::new(&self.device));
-                        trace.record(&self.device, encoder, &mut resources.trace, (inputs, bvh), &light);
+                        let trace = self.trace.get_or_init(|| self.trace());
+                        let read = (inputs.lights.polygons(), &bvh.bound()[..]);
+                        trace.record(&self.device, encoder, &mut resources.trace, (inputs, &light), read);
                     }
                 }
             }
@@ -340,9 +350,9 @@ impl SoftShadowResources {
             written: vec![None; uses],
             params,
             gather: GatherBuffers::new(device, size, uses)?,
-            filter: FilterGroups::new(uses),
+            filter: OverPixelsGroups::new(uses),
             #[cfg(feature = "bvh")]
-            trace: TraceGroups::new(uses),
+            trace: OverPixelsGroups::new(uses),
         })
     }
 
