@@ -5,14 +5,15 @@ use crate::gpu::Slot;
 use crate::pass::photon_splatter::{raster, tiled};
 use crate::pass::{
     accumulator, composite, depth_hierarchy_build, direct_light, env_map_lighting, env_map_selector, final_gather,
-    glossy_light, image_space_tracer, irradiance_filter, nearest_occluder, photon_emitter, photon_grid, photon_guiding,
-    photon_splatter, photon_walk, soft_shadow, specular_paths, stable_sort, tone_map, trace_statistics, upsampler,
+    fused_composite, glossy_light, image_space_tracer, irradiance_filter, nearest_occluder, photon_emitter,
+    photon_grid, photon_guiding, photon_splatter, photon_walk, soft_shadow, specular_paths, stable_sort, tone_map,
+    trace_statistics, upsampler,
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
 use crate::resource::{
     MAX_LIGHTS, Photon, PhotonMap, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, environment, g_buffer,
-    guiding_tables, lights, lost_rays, marked_pixels, mesh_geometry, photon_targets, view,
+    guiding_tables, lights, lost_rays, marked_pixels, mesh_geometry, pending_penumbrae, photon_targets, view,
 };
 use crate::scene::Material;
 use crate::wgsl;
@@ -323,7 +324,7 @@ fn twins() -> Vec<Twin> {
             factor, is_corrected, sample_offset,
         }),
         twin!(wgsl::UPSAMPLER, "Marking", marked_pixels::gpu::MarkedPixels { workgroups, count, pixels }),
-        twin!(wgsl::UPSAMPLER, "Params", upsampler::gpu::Params {
+        twin!(wgsl::UPSAMPLER, "Interpolation", upsampler::gpu::Interpolation {
             factor, target_factor, normal_agreement, plane_distance, disagreement, is_marking
         }),
         twin!(wgsl::PHOTON_SPLATTER_MARKED, "MarkedPixels", marked_pixels::gpu::MarkedPixels {
@@ -336,15 +337,16 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::NEAREST_OCCLUDER, "Params", nearest_occluder::gpu::Params {
             light_count, shadow_map_size, layer_count,
         }),
-        twin!(wgsl::SOFT_SHADOW_BLUR, "Params", soft_shadow::gpu::Params {
-            light, shadow_map_size, layer_count, search, search_taps, blur_taps, disc_taps, rays, sample_offset, is_gathered,
+        twin!(wgsl::SOFT_SHADOW_BLUR, "Params", pending_penumbrae::gpu::PenumbraParams {
+            light, shadow_map_size, layer_count, search, search_taps, blur_taps, disc_taps, rays, sample_offset, gathered,
             max_radius, range_scale,
         }),
         twin!(wgsl::SOFT_SHADOW_LIST, "Listing", soft_shadow::gather::gpu::TileList { workgroups, count, tiles }),
         twin!(wgsl::SOFT_SHADOW_BLUR, "TileList", soft_shadow::gather::gpu::TileList { workgroups, count, tiles }),
-        twin!(wgsl::COMPOSITE, "Params", composite::gpu::Params {
+        twin!(wgsl::COMPOSITE, "Parts", composite::gpu::Parts {
             output_scale, direct_weight, indirect_weight, caustic_weight, emission_weight, diffuse_weight, has_specular,
         }),
+        twin!(wgsl::FUSED_COMPOSITE, "Counts", fused_composite::gpu::Counts { lights, layers, shadow_map_size }),
         twin!(wgsl::ACCUMULATOR, "Params", accumulator::gpu::Params { history_weight, mean_weight }),
         twin!(wgsl::TONE_MAP, "Params", tone_map::gpu::Params { exposure, curve, inverse_gamma }),
         twin!(wgsl::ENV_MAP_SELECTOR, "Params", env_map_selector::gpu::Params {
@@ -495,6 +497,7 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "SoftShadow test" => vec![&soft_shadow::gather::TEST_SLOTS, &soft_shadow::gather::MAP_SLOTS],
         #[cfg(feature = "bvh")]
         "SoftShadow test by triangles" => vec![&soft_shadow::gather::TEST_SLOTS, &bvh_geometry::BVH_SLOTS],
+        "SoftShadow flag" => vec![&soft_shadow::gather::FLAG_SLOTS],
         "SoftShadow list" => vec![&soft_shadow::gather::LIST_SLOTS],
         "SoftShadow search" => vec![&soft_shadow::gather::SEARCH_SLOTS, &soft_shadow::gather::MAP_SLOTS],
         "SoftShadow blur" | "SoftShadow disc" => {
@@ -505,6 +508,7 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "SoftShadow trace" => vec![&soft_shadow::over_pixels::PIXEL_SLOTS, &bvh_geometry::BVH_SLOTS],
         "Upsampler" => vec![&upsampler::SLOTS],
         "Composite" => vec![&composite::SLOTS],
+        "FusedComposite" => vec![&fused_composite::SLOTS],
         "Accumulator" => vec![&accumulator::SLOTS],
         "ToneMap" => vec![&tone_map::SLOTS],
         "EnvMapSelector" => vec![&env_map_selector::SLOTS, &env_map_selector::SWITCH_SLOTS],
@@ -839,11 +843,25 @@ fn bins_are_the_same_on_both_sides() {
 }
 
 #[test]
+fn ways_to_gather_penumbrae_have_the_same_numbers_on_both_sides() {
+    use soft_shadow::Gathered;
+    let shader = Shader::new("SoftShadow test", wgsl::SOFT_SHADOW_TEST);
+    for (name, gathered) in [
+        ("GATHERED_NOT", Gathered::Not),
+        ("GATHERED_BY_STEPS", Gathered::BySteps),
+        ("GATHERED_LATER", Gathered::Later),
+    ] {
+        assert_eq!(shader.constant(name), Literal::U32(gathered as u32), "{name}");
+    }
+}
+
+#[test]
 fn tiles_of_nearest_occluders_are_the_same_on_both_sides() {
     use crate::resource::nearest_occluders;
     for (name, source) in [
         ("NearestOccluder", wgsl::NEAREST_OCCLUDER),
         ("SoftShadow search", wgsl::SOFT_SHADOW_SEARCH),
+        ("FusedComposite", wgsl::FUSED_COMPOSITE),
     ] {
         let tiles = Shader::new(name, source).constant("TILES");
         assert_eq!(tiles, Literal::U32(nearest_occluders::TILES), "{name}");

@@ -433,6 +433,7 @@ pub(crate) const IRRADIANCE_FILTER: &str = compose![
 
 pub(crate) const UPSAMPLER: &str = compose![
     "pass/upsampler.wgsl",
+    "common/interpolate.wgsl",
     "common/bilateral.wgsl",
     "common/lost_rays.wgsl",
     "common/g_buffer.wgsl",
@@ -468,10 +469,12 @@ pub(crate) const NEAREST_OCCLUDER: &str = compose![
 pub(crate) const SOFT_SHADOW_TEST: &str = compose![
     "pass/soft_shadow/test_light.wgsl",
     "pass/soft_shadow/test_by_maps.wgsl",
+    "pass/soft_shadow/gap_by_maps.wgsl",
     "pass/soft_shadow/reach.wgsl",
     "pass/soft_shadow/tiles.wgsl",
     "pass/soft_shadow/plane.wgsl",
     "pass/soft_shadow/receiver.wgsl",
+    "pass/soft_shadow/params.wgsl",
     "common/shadow.wgsl",
     "common/light.wgsl",
     "common/g_buffer.wgsl",
@@ -490,6 +493,7 @@ pub(crate) const SOFT_SHADOW_TEST_BY_TRIANGLES: &str = compose![
     "pass/soft_shadow/tiles.wgsl",
     "pass/soft_shadow/plane.wgsl",
     "pass/soft_shadow/receiver.wgsl",
+    "pass/soft_shadow/params.wgsl",
     "common/shadow.wgsl",
     "common/light.wgsl",
     "common/g_buffer.wgsl",
@@ -506,19 +510,32 @@ pub(crate) const SOFT_SHADOW_TEST_BY_TRIANGLES: &str = compose![
 
 pub(crate) const SOFT_SHADOW_LIST: &str = compose![
     "pass/soft_shadow/list_tiles.wgsl",
+    "pass/soft_shadow/penumbra_tiles.wgsl",
     "pass/soft_shadow/tiles.wgsl",
+    "common/g_buffer.wgsl",
+    "common/octahedral.wgsl",
+];
+
+pub(crate) const SOFT_SHADOW_FLAG: &str = compose![
+    "pass/soft_shadow/flag_tiles.wgsl",
+    "pass/soft_shadow/penumbra_tiles.wgsl",
+    "pass/soft_shadow/tiles.wgsl",
+    "pass/soft_shadow/params.wgsl",
     "common/g_buffer.wgsl",
     "common/octahedral.wgsl",
 ];
 
 pub(crate) const SOFT_SHADOW_SEARCH: &str = compose![
     "pass/soft_shadow/search_occluders.wgsl",
+    "pass/soft_shadow/search_cross.wgsl",
     "pass/soft_shadow/test_by_maps.wgsl",
+    "pass/soft_shadow/gap_by_maps.wgsl",
     "pass/soft_shadow/reach.wgsl",
     "pass/soft_shadow/tile_list_pixel.wgsl",
     "pass/soft_shadow/tiles.wgsl",
     "pass/soft_shadow/plane.wgsl",
     "pass/soft_shadow/receiver.wgsl",
+    "pass/soft_shadow/params.wgsl",
     "common/shadow.wgsl",
     "common/light.wgsl",
     "common/g_buffer.wgsl",
@@ -535,10 +552,12 @@ pub(crate) const SOFT_SHADOW_BLUR: &str = compose![
     "pass/soft_shadow/blur.wgsl",
     "pass/soft_shadow/disc.wgsl",
     "pass/soft_shadow/test_by_maps.wgsl",
+    "pass/soft_shadow/gap_by_maps.wgsl",
     "pass/soft_shadow/tile_list_pixel.wgsl",
     "pass/soft_shadow/tiles.wgsl",
     "pass/soft_shadow/plane.wgsl",
     "pass/soft_shadow/receiver.wgsl",
+    "pass/soft_shadow/params.wgsl",
     "common/shadow.wgsl",
     "common/light.wgsl",
     "common/g_buffer.wgsl",
@@ -551,13 +570,16 @@ pub(crate) const SOFT_SHADOW_BLUR: &str = compose![
 
 pub(crate) const SOFT_SHADOW_DISC: &str = compose![
     "pass/soft_shadow/blur_disc.wgsl",
+    "pass/soft_shadow/gather_disc.wgsl",
     "pass/soft_shadow/blur.wgsl",
     "pass/soft_shadow/test_by_maps.wgsl",
+    "pass/soft_shadow/gap_by_maps.wgsl",
     "pass/soft_shadow/disc.wgsl",
     "pass/soft_shadow/tile_list_pixel.wgsl",
     "pass/soft_shadow/tiles.wgsl",
     "pass/soft_shadow/plane.wgsl",
     "pass/soft_shadow/receiver.wgsl",
+    "pass/soft_shadow/params.wgsl",
     "common/shadow.wgsl",
     "common/light.wgsl",
     "common/g_buffer.wgsl",
@@ -571,10 +593,12 @@ pub(crate) const SOFT_SHADOW_DISC: &str = compose![
 pub(crate) const SOFT_SHADOW_FILTER: &str = compose![
     "pass/soft_shadow/filter_maps.wgsl",
     "pass/soft_shadow/test_by_maps.wgsl",
+    "pass/soft_shadow/gap_by_maps.wgsl",
     "pass/soft_shadow/reach.wgsl",
     "pass/soft_shadow/disc.wgsl",
     "pass/soft_shadow/plane.wgsl",
     "pass/soft_shadow/receiver.wgsl",
+    "pass/soft_shadow/params.wgsl",
     "common/shadow.wgsl",
     "common/light.wgsl",
     "common/g_buffer.wgsl",
@@ -589,6 +613,7 @@ pub(crate) const SOFT_SHADOW_FILTER: &str = compose![
 pub(crate) const SOFT_SHADOW_TRACE: &str = compose![
     "pass/soft_shadow/trace_lamp.wgsl",
     "pass/soft_shadow/receiver.wgsl",
+    "pass/soft_shadow/params.wgsl",
     "common/shadow.wgsl",
     "common/light.wgsl",
     "common/g_buffer.wgsl",
@@ -702,12 +727,47 @@ pub(crate) const GLOSSY_LIGHT: &str = compose![
 
 pub(crate) const COMPOSITE: &str = compose![
     "pass/composite.wgsl",
+    "common/surface_radiance.wgsl",
     "common/environment.wgsl",
     "common/environment_texel.wgsl",
     "common/lobe.wgsl",
     "common/full_screen.wgsl",
     "common/g_buffer.wgsl",
     "common/octahedral.wgsl",
+];
+
+pub(crate) const FUSED_COMPOSITE: &str = compose![
+    "pass/fused_composite.wgsl",
+    "common/surface_radiance.wgsl",
+    "common/interpolate.wgsl",
+    "common/bilateral.wgsl",
+    "common/subsampling.wgsl",
+    "pass/soft_shadow/search_cross.wgsl",
+    "pass/soft_shadow/gather_disc.wgsl",
+    "pass/soft_shadow/blur.wgsl",
+    "pass/soft_shadow/disc.wgsl",
+    "pass/soft_shadow/gap_by_maps.wgsl",
+    "pass/soft_shadow/reach.wgsl",
+    "pass/soft_shadow/tiles.wgsl",
+    "pass/soft_shadow/plane.wgsl",
+    "pass/soft_shadow/receiver.wgsl",
+    "pass/soft_shadow/params.wgsl",
+    "common/light_irradiance.wgsl",
+    "common/polygon.wgsl",
+    "common/is_lit.wgsl",
+    "common/shadow.wgsl",
+    "common/light.wgsl",
+    "common/environment.wgsl",
+    "common/environment_texel.wgsl",
+    "common/lobe.wgsl",
+    "common/full_screen.wgsl",
+    "common/g_buffer.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+    "common/hash.wgsl",
 ];
 
 pub(crate) const ACCUMULATOR: &str = compose!["pass/accumulator.wgsl", "common/full_screen.wgsl"];
@@ -824,6 +884,7 @@ pub const MODULES: &[(&str, &str)] = &[
     #[cfg(feature = "bvh")]
     ("SoftShadow test by triangles", SOFT_SHADOW_TEST_BY_TRIANGLES),
     ("SoftShadow list", SOFT_SHADOW_LIST),
+    ("SoftShadow flag", SOFT_SHADOW_FLAG),
     ("SoftShadow search", SOFT_SHADOW_SEARCH),
     ("SoftShadow blur", SOFT_SHADOW_BLUR),
     ("SoftShadow disc", SOFT_SHADOW_DISC),
@@ -831,6 +892,7 @@ pub const MODULES: &[(&str, &str)] = &[
     #[cfg(feature = "bvh")]
     ("SoftShadow trace", SOFT_SHADOW_TRACE),
     ("Composite", COMPOSITE),
+    ("FusedComposite", FUSED_COMPOSITE),
     ("Accumulator", ACCUMULATOR),
     ("ToneMap", TONE_MAP),
     ("EnvMapSelector", ENV_MAP_SELECTOR),

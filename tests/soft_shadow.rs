@@ -173,7 +173,7 @@ fn render_by(
         shadow_maps: &shadow_maps,
         nearest: &nearest,
         bvh: bvh.as_ref(),
-        visibility: &visibility,
+        target: ShadowTarget::Visibility(&visibility),
         settings,
         sample_offset: 0,
         timestamps,

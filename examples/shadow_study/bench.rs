@@ -4,8 +4,8 @@ use super::common::adapter::Gpu;
 use super::common::clock::median;
 use lightfall::pass::{
     GBufferCapture, GBufferCaptureInputs, NearestOccluder, NearestOccluderInputs, NearestOccluderResources,
-    ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources, ShadowMethod, SoftShadow, SoftShadowInputs,
-    SoftShadowResources, SoftShadowSettings,
+    ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources, ShadowMethod, ShadowTarget, SoftShadow,
+    SoftShadowInputs, SoftShadowResources, SoftShadowSettings,
 };
 use lightfall::resource::{
     BvhGeometry, BvhGeometryConfig, CameraView, GBuffer, Geometry as _, Lights, MeshGeometry, NearestOccluders,
@@ -115,7 +115,7 @@ impl<'a> Bench<'a> {
             shadow_maps: &self.shadow_maps,
             nearest: &self.nearest,
             bvh: Some(&self.bvh),
-            visibility: &self.visibility,
+            target: ShadowTarget::Visibility(&self.visibility),
             settings: std::slice::from_ref(settings),
             sample_offset,
             timestamps: None,

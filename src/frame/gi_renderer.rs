@@ -6,6 +6,8 @@
 //! should stand.
 
 use super::caustic_view::CausticView;
+use super::direct_scene::{DirectScene, ShadowPasses};
+use super::direct_view::{DirectPasses, DirectView, DirectViewInputs, FusedParts};
 use super::env_map_placement::{EnvMapPlacement, PlacementInputs, SelectionContext};
 use super::guiding_schedule::GuidingSchedule;
 use super::indirect_scene::{IndirectScene, PhotonInputs, PhotonPasses};
@@ -13,23 +15,20 @@ use super::indirect_view::{IndirectView, IndirectViewInputs, ViewPasses};
 use super::recapture::Recapture;
 use super::selection_schedule::{PHOTON_ROUNDS, Work};
 use super::specular_view::SpecularView;
+use super::stand_ins::StandIns;
 use super::{IndirectMethod, Plan, Settings, Stage};
 use crate::pass::{
-    Composite, CompositeInputs, CompositeResources, CompositeSettings, CoverageMeasure, DirectLight, DirectLightInputs,
-    DirectLightResources, EnvMapSelector, GBufferCapture, GBufferCaptureInputs, NearestOccluder, NearestOccluderInputs,
-    NearestOccluderResources, PathShape, PhotonSplatter, PhotonSplatterResources, ShadowMapCapture,
-    ShadowMapCaptureInputs, ShadowMapCaptureResources, SoftShadow, SoftShadowInputs, SoftShadowResources,
+    Composite, CompositeInputs, CompositeResources, CompositeSettings, CoverageMeasure, EnvMapSelector,
+    FusedCompositeInputs, GBufferCapture, GBufferCaptureInputs, PathShape, PhotonSplatter, PhotonSplatterResources,
 };
 #[cfg(feature = "bvh")]
 use crate::resource::BvhGeometry;
 use crate::resource::{
     CameraView, CapturePurpose, CaptureView, DepthHierarchy, EnvMapIrradiance, EnvMaps, Environment, GBuffer, Geometry,
-    GuidingTables, Irradiance, Lights, MAX_LIGHTS, MarkedPixels, NearestOccluders, Photons, PrepareContext, Radiance,
-    ShadowMaps, Visibility,
+    GuidingTables, Irradiance, MarkedPixels, Photons, PrepareContext, Radiance, ShadowMaps, Subsampling, Visibility,
 };
 use crate::scene::{
-    Camera, EmissiveTriangle, EnvironmentImage, Lamp, Light, LightKind, LightSources, Projection, SceneBounds,
-    SceneSummary, Sun, UnitFrame,
+    Camera, EnvironmentImage, Lamp, Light, LightKind, LightSources, Projection, SceneBounds, SceneSummary, UnitFrame,
 };
 use crate::{Error, Timestamps};
 use glam::DVec3;
@@ -48,8 +47,7 @@ pub struct GiRenderer {
     direct: Option<DirectScene>,
     indirect: Option<IndirectScene>,
     state: Option<SceneState>,
-    lamp_cache: Option<LampCache>,
-    sun_cache: Option<SunCache>,
+    stand_ins: StandIns,
     placement: EnvMapPlacement,
     /// Changes whenever a resource that views bind is made anew; no two renderers share one.
     generation: u64,
@@ -74,10 +72,8 @@ pub struct GiRenderer {
 #[derive(Debug)]
 struct Passes {
     g_buffer_capture: GBufferCapture,
-    shadow_map_capture: ShadowMapCapture,
-    nearest_occluder: NearestOccluder,
-    soft_shadow: SoftShadow,
-    direct_light: DirectLight,
+    shadows: ShadowPasses,
+    direct: DirectPasses,
     env_map_selector: EnvMapSelector,
     photons: PhotonPasses,
     view: ViewPasses,
@@ -105,44 +101,13 @@ const NO_RAYS: &str = "prepare a BvhGeometry each frame, or choose tracer.kind =
 const NO_SHADOW_RAYS: &str =
     "prepare a BvhGeometry each frame, or choose another soft_shadow.method and soft_shadow.test = shadow-maps";
 
-/// Most lamps that triangles are grouped into: each has six layers of shadow maps.
-const MOST_LAMPS: usize = 16;
-
-/// What lamps were last made of.
-#[derive(Debug)]
-struct LampCache {
-    triangles: Vec<EmissiveTriangle>,
-    most: usize,
-    lamps: Vec<Lamp>,
-}
-
-/// The environment in parts, and what they were last made of.
-#[derive(Debug)]
-struct SunCache {
-    has_image: bool,
-    most: usize,
-    suns: Vec<Sun>,
-}
-
-/// Allocated while anything shines.
-#[derive(Debug)]
-struct DirectScene {
-    lights: Lights,
-    shadow_maps: ShadowMaps,
-    shadow_layers: u32,
-    capture: ShadowMapCaptureResources,
-    /// While a light has an extent.
-    soft: Option<(NearestOccluders, NearestOccluderResources)>,
-}
-
 /// Resources of one view.
 #[derive(Debug)]
 pub struct ViewResources {
     g_buffer: GBuffer,
     radiance: Radiance,
     composite: CompositeResources,
-    direct: Option<(Irradiance, DirectLightResources)>,
-    soft: Option<(Visibility, SoftShadowResources)>,
+    direct: Option<DirectView>,
     indirect: Option<IndirectView>,
     caustic: Option<CausticView>,
     specular: Option<SpecularView>,
@@ -213,10 +178,8 @@ impl GiRenderer {
         settings.validate()?;
         let passes = Passes {
             g_buffer_capture: GBufferCapture::new(),
-            shadow_map_capture: ShadowMapCapture::new(),
-            nearest_occluder: NearestOccluder::new(device),
-            soft_shadow: SoftShadow::new(device),
-            direct_light: DirectLight::new(device),
+            shadows: ShadowPasses::new(device),
+            direct: DirectPasses::new(device, settings),
             env_map_selector: EnvMapSelector::new(device),
             photons: PhotonPasses::new(device, settings),
             view: ViewPasses::new(device, settings)?,
@@ -232,8 +195,7 @@ impl GiRenderer {
             direct: None,
             indirect: None,
             state: None,
-            lamp_cache: None,
-            sun_cache: None,
+            stand_ins: StandIns::default(),
             placement: EnvMapPlacement::default(),
             generation: next_generation(),
             revision: 0,
@@ -266,7 +228,7 @@ impl GiRenderer {
             self.environment.write(queue, &state.frame, light);
         }
         self.environment_image = image.cloned();
-        self.sun_cache = None;
+        self.stand_ins.environment_changed();
         self.revision += 1;
         Ok(())
     }
@@ -288,8 +250,9 @@ impl GiRenderer {
             light.validate(index)?;
         }
         summary.validate(lights)?;
-        let suns = self.suns(summary, lights)?;
-        let lamps = self.lamps(summary, lights, &suns)?;
+        let (device, image) = (&self.device, self.environment_image.as_ref());
+        let suns = self.stand_ins.suns(device, &self.settings, image, (summary, lights))?;
+        let lamps = self.stand_ins.lamps(device, summary, (lights, &suns))?;
         let sources = LightSources {
             lights,
             suns: &suns,
@@ -346,102 +309,19 @@ impl GiRenderer {
         Ok(frame)
     }
 
-    /// What stands for the environment: as many suns as the settings want and there is room for beside the lights and one lamp.
-    fn suns(&mut self, summary: &SceneSummary, lights: &[Light]) -> Result<Vec<Light>, Error> {
-        let environment = lights.iter().find_map(|light| match light.kind {
-            LightKind::Environment { image, rotation } => Some((light, image, rotation)),
-            _ => None,
-        });
-        let Some((light, image, rotation)) = environment else {
-            return Ok(Vec::new());
-        };
-        let image = match (image, &self.environment_image) {
-            (None, _) => None,
-            (Some(_), Some(image)) => Some(image),
-            (Some(_), None) => {
-                return Err(Error::MissingInput {
-                    stage: "DirectLight",
-                    input: "an environment's image",
-                    remedy: "hand it to GiRenderer::set_environment, or take LightKind::Environment { image: None, .. }",
-                });
-            }
-        };
-        let lamps = usize::from(!summary.emissive_triangles.is_empty());
-        let others = lights.iter().filter(|l| !l.is_environment()).count() + lamps;
-        let layers = ShadowMaps::layers(lights) as usize + 6 * lamps + 1;
-        let most = (self.settings.environment_suns as usize)
-            .min(MAX_LIGHTS.saturating_sub(others))
-            .min((self.device.limits().max_texture_array_layers as usize).saturating_sub(layers));
-        let has_image = image.is_some();
-        let is_known = |c: &&SunCache| c.most == most && c.has_image == has_image;
-        if self.sun_cache.as_ref().filter(is_known).is_none() {
-            let suns = Sun::divide(image, most);
-            self.sun_cache = Some(SunCache { has_image, most, suns });
-        }
-        let suns = self.sun_cache.iter().flat_map(|c| &c.suns);
-        Ok(suns.map(|s| s.light(light.strength(), rotation)).collect())
-    }
-
-    /// As many as there is room for beside the other lights, grouped anew where their triangles have changed.
-    fn lamps(&mut self, summary: &SceneSummary, lights: &[Light], suns: &[Light]) -> Result<Vec<Lamp>, Error> {
-        if summary.emissive_triangles.is_empty() {
-            self.lamp_cache = None;
-            return Ok(Vec::new());
-        }
-        let others = lights.iter().filter(|l| !l.is_environment()).count() + suns.len();
-        let layers = self.device.limits().max_texture_array_layers;
-        let free_layers = layers.saturating_sub(1 + ShadowMaps::layers(lights) + ShadowMaps::layers(suns));
-        let most = MOST_LAMPS
-            .min(free_layers as usize / 6)
-            .min(MAX_LIGHTS.saturating_sub(others));
-        if most == 0 {
-            return Err(Error::CountMismatch {
-                what: "lights beside surfaces that shine (most a scene may have)",
-                expected: MAX_LIGHTS - 1,
-                found: others,
-            });
-        }
-        let is_known = |c: &LampCache| c.most == most && c.triangles == summary.emissive_triangles;
-        if let Some(cache) = self.lamp_cache.as_ref().filter(|c| is_known(c)) {
-            return Ok(cache.lamps.clone());
-        }
-        let lamps = Lamp::group(&summary.emissive_triangles, most);
-        self.lamp_cache = Some(LampCache {
-            triangles: summary.emissive_triangles.clone(),
-            most,
-            lamps: lamps.clone(),
-        });
-        Ok(lamps)
-    }
-
     fn allocate(&mut self, queue: &wgpu::Queue, plan: &Plan, lights: &[Light]) -> Result<(), Error> {
         let (device, settings) = (&self.device, &self.settings);
-        if !plan.is_on(Stage::DirectLight) {
+        if !plan.is_on(Stage::ShadowMapCapture) {
             self.direct = None;
-        } else if self
-            .direct
-            .as_ref()
-            .is_none_or(|d| d.shadow_layers != ShadowMaps::layers(lights))
-        {
+        } else if !self.direct.as_ref().is_some_and(|d| d.fits(lights)) {
             self.generation = next_generation();
             if let Some(indirect) = &mut self.indirect {
                 indirect.renew_emitter(device)?;
             }
-            self.direct = Some(DirectScene {
-                lights: Lights::new(device)?,
-                shadow_maps: ShadowMaps::new(device, lights, settings.shadow_map_size)?,
-                shadow_layers: ShadowMaps::layers(lights),
-                capture: ShadowMapCaptureResources::new(device, settings.shadow_map_size)?,
-                soft: None,
-            });
+            self.direct = Some(DirectScene::new(device, settings, lights)?);
         }
         if let Some(direct) = &mut self.direct {
-            if !plan.is_on(Stage::SoftShadow) {
-                direct.soft = None;
-            } else if direct.soft.is_none() {
-                let nearest = NearestOccluders::new(device, direct.shadow_layers)?;
-                direct.soft = Some((nearest, NearestOccluderResources::new(device)?));
-            }
+            direct.follow(device, plan)?;
         }
         if !plan.is_on(Stage::PhotonEmitter) {
             self.indirect = None;
@@ -718,30 +598,9 @@ impl GiRenderer {
     }
 
     fn record_shadow_maps(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) {
-        let Some(direct) = &mut self.direct else {
-            return;
-        };
-        let shadow_inputs = ShadowMapCaptureInputs {
-            shadow_maps: &direct.shadow_maps,
-            geometry: inputs.geometry,
-            views: &self.views[self.light_views.clone()],
-            timestamps: inputs.timestamps,
-        };
-        self.passes
-            .shadow_map_capture
-            .record(encoder, &mut direct.capture, &shadow_inputs);
-        if let Some((nearest, own)) = &mut direct.soft
-            && let Some(state) = &self.state
-            && state.plan.is_on(Stage::NearestOccluder)
-        {
-            let nearest_inputs = NearestOccluderInputs {
-                queue: inputs.queue,
-                lights: &direct.lights,
-                shadow_maps: &direct.shadow_maps,
-                nearest,
-                timestamps: inputs.timestamps,
-            };
-            self.passes.nearest_occluder.record(encoder, own, &nearest_inputs);
+        if let (Some(direct), Some(state)) = (&mut self.direct, &self.state) {
+            let views = &self.views[self.light_views.clone()];
+            direct.record(encoder, &self.passes.shadows, (inputs, &state.plan, views));
         }
     }
 
@@ -777,7 +636,6 @@ impl GiRenderer {
             radiance: Radiance::new(&self.device, size)?,
             composite: CompositeResources::new(&self.device)?,
             direct: None,
-            soft: None,
             indirect: None,
             caustic: None,
             specular: None,
@@ -822,36 +680,16 @@ impl GiRenderer {
         self.passes
             .g_buffer_capture
             .record(encoder, &mut resources.g_buffer, &g_buffer_inputs);
-        if let (Some(scene), Some((visibility, own))) = (&self.direct, &mut resources.soft)
-            && let Some((nearest, _)) = &scene.soft
-        {
-            let soft_settings = self.settings.soft_shadows(&scene.lights);
-            let soft_inputs = SoftShadowInputs {
-                queue: inputs.queue,
+        if let (Some(scene), Some(own)) = (&self.direct, &mut resources.direct) {
+            let direct_inputs = DirectViewInputs {
+                view: inputs,
+                settings: &self.settings,
+                passes: &self.passes.direct,
+                scene,
                 g_buffer: &resources.g_buffer,
-                lights: &scene.lights,
-                shadow_maps: &scene.shadow_maps,
-                nearest,
-                #[cfg(feature = "bvh")]
-                bvh: inputs.bvh,
-                visibility,
-                settings: &soft_settings,
                 sample_offset: self.sample_offset,
-                timestamps: inputs.timestamps,
             };
-            self.passes.soft_shadow.record(encoder, own, &soft_inputs);
-        }
-        if let (Some(scene), Some((irradiance, own))) = (&self.direct, &mut resources.direct) {
-            let direct_inputs = DirectLightInputs {
-                queue: inputs.queue,
-                g_buffer: &resources.g_buffer,
-                lights: &scene.lights,
-                shadow_maps: &scene.shadow_maps,
-                visibility: resources.soft.as_ref().map(|s| &s.0),
-                irradiance,
-                timestamps: inputs.timestamps,
-            };
-            self.passes.direct_light.record(encoder, own, &direct_inputs);
+            own.record(encoder, &direct_inputs);
         }
         if let (Some(scene), Some(own), Some(state), Some(direct)) =
             (&self.indirect, &mut resources.indirect, &self.state, &self.direct)
@@ -876,16 +714,48 @@ impl GiRenderer {
                 specular.record(encoder, &indirect_inputs, &direct.shadow_maps, &self.environment)?;
             }
         }
+        self.record_sum(encoder, resources, inputs);
+        Ok(())
+    }
+
+    /// Records what puts all of it together.
+    fn record_sum(&self, encoder: &mut wgpu::CommandEncoder, resources: &mut ViewResources, inputs: &ViewInputs<'_>) {
+        let caustic = resources.caustic.as_ref().map(CausticView::irradiance);
+        let specular = resources.specular.as_ref().map(SpecularView::radiance);
+        if let (Some(scene), Some(direct), Some(fused)) =
+            (&self.direct, &mut resources.direct, &self.passes.direct.fused)
+            && let Some(FusedParts { own, penumbrae }) = direct.fused(scene)
+        {
+            let indirect = resources.indirect.as_ref().map(IndirectView::samples);
+            let (indirect, subsampling) = indirect.unwrap_or((&self.black, Subsampling::Full));
+            let fused_inputs = FusedCompositeInputs {
+                queue: inputs.queue,
+                g_buffer: &resources.g_buffer,
+                lights: &scene.lights,
+                shadow_maps: &scene.shadow_maps,
+                penumbrae,
+                indirect,
+                subsampling,
+                upsampler: &self.settings.upsampler,
+                caustic,
+                specular,
+                environment: &self.environment,
+                radiance: &resources.radiance,
+                settings: inputs.composite,
+                timestamps: inputs.timestamps,
+            };
+            fused.record(encoder, own, &fused_inputs);
+            return;
+        }
+        let direct = resources.direct.as_ref().and_then(DirectView::irradiance);
+        let indirect = resources.indirect.as_ref().and_then(IndirectView::irradiance);
         let composite_inputs = CompositeInputs {
             queue: inputs.queue,
             g_buffer: &resources.g_buffer,
-            direct: resources.direct.as_ref().map_or(&self.black, |d| &d.0),
-            indirect: resources
-                .indirect
-                .as_ref()
-                .map_or(&self.black, IndirectView::irradiance),
-            caustic: resources.caustic.as_ref().map(CausticView::irradiance),
-            specular: resources.specular.as_ref().map(SpecularView::radiance),
+            direct: direct.unwrap_or(&self.black),
+            indirect: indirect.unwrap_or(&self.black),
+            caustic,
+            specular,
             environment: &self.environment,
             radiance: &resources.radiance,
             settings: inputs.composite,
@@ -894,38 +764,24 @@ impl GiRenderer {
         self.passes
             .composite
             .record(encoder, &mut resources.composite, &composite_inputs);
-        Ok(())
     }
 
     fn allocate_view(&self, view: &mut ViewResources) -> Result<(), Error> {
         let (device, size) = (&self.device, view.size);
         if view.generation != self.generation {
             // Another renderer's, or from before a resource was replaced: neither fits, and both would keep it alive.
-            (view.direct, view.soft, view.indirect) = (None, None, None);
+            (view.direct, view.indirect) = (None, None);
             (view.caustic, view.specular) = (None, None);
             view.generation = self.generation;
         }
-        match &self.direct {
-            None => view.direct = None,
-            Some(_) if view.direct.is_none() => {
-                let irradiance = Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?;
-                view.direct = Some((irradiance, DirectLightResources::new(device)?));
+        view.direct = match (&self.direct, view.direct.take()) {
+            (None, _) => None,
+            (Some(scene), own) => {
+                let mut own = own.map_or_else(|| DirectView::new(device, &self.settings, size), Ok)?;
+                own.follow(device, &self.settings, size, scene)?;
+                Some(own)
             }
-            Some(_) => {}
-        }
-        match &self.direct {
-            Some(DirectScene {
-                lights, soft: Some(_), ..
-            }) => {
-                // As many layers as lights; the same shadow maps may serve other numbers of them.
-                if view.soft.as_ref().is_none_or(|s| s.0.lights() != lights.count()) {
-                    let visibility = Visibility::new(device, size, lights.count())?;
-                    let own = SoftShadowResources::new(device, size, lights.count())?;
-                    view.soft = Some((visibility, own));
-                }
-            }
-            _ => view.soft = None,
-        }
+        };
         match &self.indirect {
             None => view.indirect = None,
             Some(scene) if view.indirect.is_none() => {
@@ -1031,14 +887,7 @@ impl GiRenderer {
             ("environment", self.environment.memory_use()),
         ];
         if let Some(direct) = &self.direct {
-            list.push(("lights", direct.lights.memory_use()));
-            list.push((
-                "shadow_maps",
-                direct.shadow_maps.memory_use() + direct.capture.memory_use(),
-            ));
-            if let Some((nearest, own)) = &direct.soft {
-                list.push(("nearest_occluders", nearest.memory_use() + own.memory_use()));
-            }
+            list.extend(direct.memory_by_resource());
         }
         if let Some(indirect) = &self.indirect {
             list.extend(indirect.memory_by_resource());
@@ -1066,14 +915,14 @@ impl ViewResources {
         &self.g_buffer
     }
 
-    /// Direct irradiance, if anything shines.
+    /// Direct irradiance, if anything shines; none with [`Settings::fuses_composite`].
     pub fn direct(&self) -> Option<&Irradiance> {
-        self.direct.as_ref().map(|d| &d.0)
+        self.direct.as_ref().and_then(DirectView::irradiance)
     }
 
-    /// How much of each light is seen, if one has an extent.
+    /// How much of each light is seen, if one has an extent; none with [`Settings::fuses_composite`].
     pub fn visibility(&self) -> Option<&Visibility> {
-        self.soft.as_ref().map(|s| &s.0)
+        self.direct.as_ref().and_then(DirectView::visibility)
     }
 
     /// What was estimated anew at each level of up-sampling, from coarse to fine; nothing where pixels are interpolated only.
@@ -1086,9 +935,9 @@ impl ViewResources {
         self.caustic.as_ref().map(CausticView::irradiance)
     }
 
-    /// Indirect irradiance, if there is any.
+    /// Indirect irradiance at all pixels, if there is any; with [`Settings::fuses_composite`] none where it is interpolated.
     pub fn indirect(&self) -> Option<&Irradiance> {
-        self.indirect.as_ref().map(IndirectView::irradiance)
+        self.indirect.as_ref().and_then(IndirectView::irradiance)
     }
 
     /// Bytes of this view, by resource.
@@ -1097,12 +946,8 @@ impl ViewResources {
             ("g_buffer", self.g_buffer.memory_use()),
             ("radiance", self.radiance.memory_use() + self.composite.memory_use()),
         ];
-        if let Some((irradiance, own)) = &self.direct {
-            list.push(("direct_irradiance", irradiance.memory_use() + own.memory_use()));
-        }
-        if let Some((visibility, own)) = &self.soft {
-            list.push(("visibility", visibility.memory_use()));
-            list.push(("soft_shadow", own.memory_use()));
+        if let Some(own) = &self.direct {
+            list.extend(own.memory_by_resource());
         }
         if let Some(own) = &self.indirect {
             list.extend(own.memory_by_resource());

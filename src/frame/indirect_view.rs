@@ -34,9 +34,10 @@ pub(super) struct ViewPasses {
 pub(super) struct IndirectView {
     estimate: Estimate,
     estimated: Irradiance,
+    subsampling: Subsampling,
     /// If photons are guided.
     guiding: Option<PhotonGuidingResources>,
-    /// From coarse to fine, while fewer pixels are estimated than seen.
+    /// From coarse to fine, while fewer pixels are estimated than seen; without the last where that is left to the sum.
     levels: Vec<UpsampledLevel>,
 }
 
@@ -137,6 +138,9 @@ impl IndirectView {
         let mut finer = settings.subsampling.finer();
         while let Some(subsampling) = finer {
             finer = subsampling.finer();
+            if settings.fuses_composite && finer.is_none() {
+                break;
+            }
             if by_levels || finer.is_none() {
                 let is_marked = by_levels && splats && config.shape == SplatShape::Tiled;
                 levels.push(UpsampledLevel::new(device, subsampling, size, is_marked)?);
@@ -146,14 +150,22 @@ impl IndirectView {
         Ok(Self {
             estimate,
             estimated,
+            subsampling: settings.subsampling,
             guiding: guiding.transpose()?,
             levels,
         })
     }
 
-    /// At all pixels.
-    pub(super) fn irradiance(&self) -> &Irradiance {
-        self.levels.last().map_or(&self.estimated, |l| &l.irradiance)
+    /// The finest there is, and where its samples stand.
+    pub(super) fn samples(&self) -> (&Irradiance, Subsampling) {
+        let estimated = (&self.estimated, self.subsampling);
+        self.levels.last().map_or(estimated, |l| (&l.irradiance, l.subsampling))
+    }
+
+    /// At all pixels, unless the step to them is left to the sum.
+    pub(super) fn irradiance(&self) -> Option<&Irradiance> {
+        let (irradiance, subsampling) = self.samples();
+        (subsampling == Subsampling::Full).then_some(irradiance)
     }
 
     /// What was estimated anew at each level, from coarse to fine.

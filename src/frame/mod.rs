@@ -2,6 +2,8 @@
 //! [`GiRenderer`] records them in order. It uses public passes only: whatever it does, a host can do by hand.
 
 mod caustic_view;
+mod direct_scene;
+mod direct_view;
 mod env_map_placement;
 mod gi_renderer;
 mod guiding_schedule;
@@ -12,6 +14,7 @@ mod recapture;
 mod selection_schedule;
 mod settings;
 mod specular_view;
+mod stand_ins;
 mod traced_photons;
 
 pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};

@@ -1,6 +1,6 @@
 //! Model only what the scene requires: which stages run, and why.
 
-use super::{GlossyMethod, IndirectMethod, Settings, TracerKind};
+use super::{GlossyMethod, IndirectMethod, Settings, TracerKind, Upsampling};
 use crate::pass::FirstHits;
 use crate::resource::MAX_DIRECT_POLYGONS;
 use crate::scene::SceneSummary;
@@ -51,6 +51,8 @@ pub enum Stage {
     SpecularPaths,
     /// What rough metal sends to the eye, from photons.
     GlossyLight,
+    /// Penumbrae, the last step of up-sampling, direct light and the sum, all at once.
+    FusedComposite,
     /// The sum.
     Composite,
 }
@@ -81,6 +83,9 @@ pub struct Plan {
     /// What the scene has that is not modelled yet, and what is done instead.
     pub simplifications: Vec<String>,
 }
+
+/// Why a stage does not run whose work is done.
+const IN_ONE_PASS: &str = "within FusedComposite";
 
 impl Plan {
     /// Decides from what is in the scene and what the settings allow.
@@ -125,14 +130,15 @@ impl Plan {
         let [selection, maps, hierarchies] = map_stages(&indirect, settings);
         let [image_space, bvh] = tracers(&indirect, settings);
         let upsampling = upsampling(&indirect, settings);
+        let [direct, fused, sum] = sums(&lit, settings);
         let [splatting, gathering, filtering] = estimates(&indirect, settings);
         Self {
             stages: vec![
                 stage(Stage::GBufferCapture, always("every view")),
-                stage(Stage::ShadowMapCapture, lit.clone()),
+                stage(Stage::ShadowMapCapture, lit),
                 stage(Stage::NearestOccluder, nearest),
                 stage(Stage::SoftShadow, soft),
-                stage(Stage::DirectLight, lit),
+                stage(Stage::DirectLight, direct),
                 stage(Stage::EnvMapSelector, selection),
                 stage(Stage::EnvMapCapture, maps),
                 stage(Stage::DepthHierarchyBuild, hierarchies),
@@ -149,7 +155,8 @@ impl Plan {
                 stage(Stage::PhotonGrid, specular.clone()),
                 stage(Stage::SpecularPaths, specular),
                 stage(Stage::GlossyLight, glossy),
-                stage(Stage::Composite, always("every view")),
+                stage(Stage::FusedComposite, fused),
+                stage(Stage::Composite, sum),
             ],
             simplifications: simplifications(summary, settings),
         }
@@ -293,10 +300,29 @@ fn caustics(specular: &(bool, String), summary: &SceneSummary, settings: &Settin
 
 fn upsampling(indirect: &(bool, String), settings: &Settings) -> (bool, String) {
     let factor = settings.subsampling.factor();
+    let has_one_step = settings.upsampling == Upsampling::AtOnce || factor == 2;
+    let is_left_to_the_sum = settings.fuses_composite && has_one_step;
     match (indirect.0, factor) {
         (false, _) => indirect.clone(),
         (true, 1) => (false, "every pixel is estimated".to_owned()),
+        (true, _) if is_left_to_the_sum => (false, IN_ONE_PASS.to_owned()),
         (true, _) => (true, format!("one pixel in {factor} × {factor} is estimated")),
+    }
+}
+
+/// Direct light, and the sum with all that comes before it or by itself.
+fn sums(lit: &(bool, String), settings: &Settings) -> [(bool, String); 3] {
+    let sum = (true, "every view".to_owned());
+    match (lit.0, settings.fuses_composite) {
+        (false, true) => [lit.clone(), lit.clone(), sum],
+        (_, false) => {
+            let fused = (false, "settings take one pass after the other".to_owned());
+            [lit.clone(), fused, sum]
+        }
+        (true, true) => {
+            let within = (false, IN_ONE_PASS.to_owned());
+            [within.clone(), lit.clone(), within]
+        }
     }
 }
 

@@ -195,6 +195,11 @@ pub struct Settings {
     pub upsampling: Upsampling,
     /// Between which pixels, and where in doubt.
     pub upsampler: UpsamplerSettings,
+    /// Whether penumbrae are gathered, indirect light is interpolated to all pixels and all light is summed in one pass
+    /// ([`FusedComposite`](crate::pass::FusedComposite)) instead of one after the other. Saves memory and what passes write for
+    /// each other; crosses become discs, pixels in doubt at the last level are not estimated anew, and there is no irradiance of a view
+    /// to look at.
+    pub fuses_composite: bool,
 }
 
 impl Default for Settings {
@@ -272,6 +277,7 @@ impl Settings {
             subsampling: Subsampling::Quarter,
             upsampling: Upsampling::default(),
             upsampler: UpsamplerSettings::default(),
+            fuses_composite: false,
         }
     }
 
@@ -815,6 +821,13 @@ const KNOBS: &[Knob] = &[
         "0 or more: share of the mean",
         upsampler.disagreement,
         |v: f32| v >= 0.0
+    ),
+    choice!(
+        "composite.fused",
+        "on or off",
+        fuses_composite,
+        ["on", true],
+        ["off", false]
     ),
 ];
 

@@ -14,10 +14,10 @@ use crate::{Error, Timestamps, wgsl};
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
-    /// Twin of `Params` in `shaders/pass/composite.wgsl`.
+    /// Twin of `Parts` in `shaders/common/surface_radiance.wgsl`.
     #[derive(Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
-    pub(crate) struct Params {
+    pub(crate) struct Parts {
         pub(crate) output_scale: f32,
         pub(crate) direct_weight: f32,
         pub(crate) indirect_weight: f32,
@@ -74,6 +74,21 @@ impl Default for CompositeSettings {
     }
 }
 
+impl CompositeSettings {
+    /// With or without caustics and specular surfaces apart from other light.
+    pub(super) fn parts(&self, has_caustic: bool, has_specular: bool) -> gpu::Parts {
+        gpu::Parts {
+            output_scale: self.output_scale,
+            direct_weight: self.direct,
+            indirect_weight: self.indirect,
+            caustic_weight: if has_caustic { self.caustic } else { 0.0 },
+            emission_weight: self.emission,
+            diffuse_weight: self.diffuse,
+            has_specular: has_specular.into(),
+        }
+    }
+}
+
 /// The pass.
 #[derive(Debug)]
 pub struct Composite {
@@ -126,18 +141,12 @@ impl Composite {
         resources: &mut CompositeResources,
         inputs: &CompositeInputs<'_>,
     ) {
-        let params = gpu::Params {
-            output_scale: inputs.settings.output_scale,
-            direct_weight: inputs.settings.direct,
-            indirect_weight: inputs.settings.indirect,
-            caustic_weight: inputs.caustic.map_or(0.0, |_| inputs.settings.caustic),
-            emission_weight: inputs.settings.emission,
-            diffuse_weight: inputs.settings.diffuse,
-            has_specular: u32::from(inputs.specular.is_some()),
-        };
+        let parts = inputs
+            .settings
+            .parts(inputs.caustic.is_some(), inputs.specular.is_some());
         inputs
             .queue
-            .write_buffer(&resources.inner.params, 0, bytemuck::bytes_of(&params));
+            .write_buffer(&resources.inner.params, 0, bytemuck::bytes_of(&parts));
         let views = inputs.g_buffer.views();
         let bound = [
             inputs.g_buffer.view_buffer().into(),
@@ -163,7 +172,7 @@ impl CompositeResources {
     /// # Errors
     /// [`Error::LimitExceeded`] if the device grants next to nothing.
     pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
-        let inner = FullScreenResources::new::<gpu::Params>(device, "lightfall::Composite::params")?;
+        let inner = FullScreenResources::new::<gpu::Parts>(device, "lightfall::Composite::params")?;
         Ok(Self { inner })
     }
 

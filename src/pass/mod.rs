@@ -16,6 +16,7 @@ pub(crate) mod env_map_lighting;
 pub(crate) mod env_map_selector;
 pub(crate) mod final_gather;
 mod full_screen;
+pub(crate) mod fused_composite;
 mod g_buffer_capture;
 pub(crate) mod glossy_light;
 pub(crate) mod image_space_tracer;
@@ -49,6 +50,7 @@ pub use env_map_selector::{
     MAX_SELECTED, SelectBlockingInputs, Selection, SelectionStep, Sight,
 };
 pub use final_gather::{FinalGather, FinalGatherInputs, FinalGatherResources};
+pub use fused_composite::{FusedComposite, FusedCompositeInputs, FusedCompositeResources};
 pub use g_buffer_capture::{GBufferCapture, GBufferCaptureInputs};
 pub use glossy_light::{GlossyLight, GlossyLightInputs, GlossyLightResources};
 pub use image_space_tracer::{
@@ -74,7 +76,8 @@ pub use photon_walk::SharedHop;
 pub use shadow_map_capture::{ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources};
 pub(crate) use soft_shadow::{MAX_POINTS, MAX_TAPS};
 pub use soft_shadow::{
-    OccluderTest, PenumbraSearch, ShadowMethod, SoftShadow, SoftShadowInputs, SoftShadowResources, SoftShadowSettings,
+    OccluderTest, PenumbraSearch, ShadowMethod, ShadowTarget, SoftShadow, SoftShadowInputs, SoftShadowResources,
+    SoftShadowSettings,
 };
 pub use specular_paths::{PathShape, SpecularPaths, SpecularPathsInputs, SpecularPathsResources};
 pub use tone_map::{ToneCurve, ToneMap, ToneMapInputs, ToneMapResources, ToneMapSettings};

@@ -32,10 +32,10 @@ use crate::{Error, Timestamps, wgsl};
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
-    /// Twin of `Params` in `shaders/pass/upsampler.wgsl`.
+    /// Twin of `Interpolation` in `shaders/common/interpolate.wgsl`.
     #[derive(Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
-    pub(crate) struct Params {
+    pub(crate) struct Interpolation {
         pub(crate) factor: u32,
         pub(crate) target_factor: u32,
         pub(crate) normal_agreement: f32,
@@ -83,6 +83,20 @@ impl Default for UpsamplerSettings {
             normal_agreement: 0.7,
             plane_distance: 0.5,
             disagreement: 0.25,
+        }
+    }
+}
+
+impl UpsamplerSettings {
+    /// Without marks.
+    pub(super) fn interpolation(&self, samples: Subsampling, target: Subsampling) -> gpu::Interpolation {
+        gpu::Interpolation {
+            factor: samples.factor(),
+            target_factor: target.factor(),
+            normal_agreement: self.normal_agreement,
+            plane_distance: self.plane_distance,
+            disagreement: self.disagreement,
+            is_marking: 0,
         }
     }
 }
@@ -160,13 +174,9 @@ impl Upsampler {
     ) {
         let size = inputs.target.size(inputs.g_buffer.size());
         let marked = inputs.marked.filter(|m| m.size() == size);
-        let params = gpu::Params {
-            factor: inputs.subsampling.factor(),
-            target_factor: inputs.target.factor(),
-            normal_agreement: inputs.settings.normal_agreement,
-            plane_distance: inputs.settings.plane_distance,
-            disagreement: inputs.settings.disagreement,
+        let params = gpu::Interpolation {
             is_marking: u32::from(marked.is_some()),
+            ..inputs.settings.interpolation(inputs.subsampling, inputs.target)
         };
         inputs
             .queue
@@ -207,7 +217,7 @@ impl UpsamplerResources {
     /// [`Error::LimitExceeded`] if the device grants next to nothing.
     pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
         Ok(Self {
-            params: device::uniform_buffer::<gpu::Params>(device, "lightfall::Upsampler::params")?,
+            params: device::uniform_buffer::<gpu::Interpolation>(device, "lightfall::Upsampler::params")?,
             no_marks: device::buffer(
                 device,
                 "lightfall::Upsampler::no_marks",

@@ -1,4 +1,5 @@
-// What the blurs share. The module brings `radii`, and `source_at`, which is visibility or a mark.
+// What the blurs share. The module brings `searched_radius`, the penumbra's radius that occluders give, and `source_at`, which is
+// visibility or a mark.
 
 // Visibility, or a mark, of a distance to an occluder, or a mark.
 fn occlusion_visibility(gap: f32) -> f32 {
@@ -10,7 +11,7 @@ fn penumbra_found(light: Light, receiver: Receiver, id: vec2u) -> f32 {
     if params.search == 0u {
         return receiver_one_radius(light, receiver);
     }
-    return textureLoad(radii, id, 0).r;
+    return searched_radius(light, receiver, id);
 }
 
 // Whether a pixel shows the point of the receiver's plane that lies there, to a receiver of this penumbra's radius.

@@ -14,6 +14,10 @@
 // 0: across the tilt, the first to run; 1: along it
 override AXIS: u32;
 
+fn searched_radius(light: Light, receiver: Receiver, id: vec2u) -> f32 {
+    return textureLoad(radii, id, 0).r;
+}
+
 // Visibility, or a mark.
 fn source_at(pixel: vec2u) -> f32 {
     let value = textureLoad(source, pixel, 0).r;

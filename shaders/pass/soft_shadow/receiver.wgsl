@@ -1,29 +1,10 @@
 // What all ways to a soft shadow share: the receiver at a pixel, and the ellipse that a penumbra covers on it. Each step's file
 // binds `params`, `view`, `depth_texture` and `normal_texture`.
 
-struct Params {
-    // Index of the light
-    light: u32,
-    shadow_map_size: u32,
-    layer_count: u32,
-    // 0: no search, one radius for all
-    search: u32,
-    search_taps: u32,
-    blur_taps: u32,
-    disc_taps: u32,
-    // Rays to the lamp
-    rays: u32,
-    // Turns the rays of another frame
-    sample_offset: u32,
-    // 1: what is found is gathered afterwards
-    is_gathered: u32,
-    max_radius: f32,
-    range_scale: f32,
-}
-
 // A receiver that is tilted further than this counts as tilted this much: the pixels of its penumbra are many, and its
 // light is an eighth.
 const LEAST_COSINE: f32 = 0.125;
+
 struct Receiver {
     position: vec3f,
     normal: vec3f,
@@ -46,8 +27,11 @@ fn receiver_distance(light: Light, p: vec3f) -> f32 {
 }
 
 fn receiver_at(light: Light, id: vec2u) -> Receiver {
-    let p = receiver_position(id);
     let n = g_buffer_normal(view, textureLoad(normal_texture, id + view.origin, 0));
+    return receiver_of(light, receiver_position(id), n);
+}
+
+fn receiver_of(light: Light, p: vec3f, n: vec3f) -> Receiver {
     let distance = receiver_distance(light, p);
     let to_light = (light.position - p) / max(distance, 0x1p-60);
     return Receiver(p, n, select(to_light, -light.direction, light.kind == LIGHT_DIRECTIONAL), distance);

@@ -8,6 +8,7 @@
 @group(0) @binding(4) var base_color_texture: texture_2d<f32>;
 @group(0) @binding(5) var<storage, read> lights: array<Light>;
 @group(0) @binding(6) var<storage, read> nearest: array<f32>;
+// Visibility, or for a later pass the distance to an occluder or a mark
 @group(0) @binding(7) var visibility: texture_storage_2d<r32float, write>;
 // Distance from receiver to occluder, or a mark
 @group(0) @binding(8) var occlusion: texture_storage_2d<r32float, write>;
@@ -67,21 +68,21 @@ fn test_pixels(
             gap = occluder_gap(light, receiver);
         }
         let is_lit = gap == NO_OCCLUDER;
-        textureStore(visibility, id.xy, vec4f(select(0.0, 1.0, is_lit)));
-        if params.is_gathered == 1u {
-            let marked = select(select(0.0, 1.0, is_lit), NO_RECEIVER, gap == NO_RECEIVER);
+        let seen = select(0.0, 1.0, is_lit);
+        textureStore(visibility, id.xy, vec4f(select(seen, gap, params.gathered == GATHERED_LATER)));
+        if params.gathered == GATHERED_BY_STEPS {
             textureStore(occlusion, id.xy, vec4f(gap));
-            textureStore(across, id.xy, vec4f(marked));
-            if gap != NO_RECEIVER {
-                atomicOr(&holds, select(TILE_HOLDS_SHADOW, TILE_HOLDS_LIGHT, is_lit));
-            }
+            textureStore(across, id.xy, vec4f(select(seen, NO_RECEIVER, gap == NO_RECEIVER)));
+        }
+        if gap != NO_RECEIVER {
+            atomicOr(&holds, select(TILE_HOLDS_SHADOW, TILE_HOLDS_LIGHT, is_lit));
         }
     }
-    if lane < 8u && params.is_gathered == 1u {
+    if lane < 8u && params.gathered != GATHERED_NOT {
         sample_reach(light, tile.xy, lane);
     }
     workgroupBarrier();
-    if lane == 0u && params.is_gathered == 1u {
+    if lane == 0u && params.gathered != GATHERED_NOT {
         let reach = tile_steps(bitcast<f32>(atomicLoad(&reach_bits)));
         tiles[tile.y * tile_counts.x + tile.x] = tile_pack(atomicLoad(&holds), reach);
     }

@@ -6,7 +6,7 @@ fn tile_list_pixel(group: vec3u, groups: vec3u, local: vec3u) -> vec2u {
     if index >= list.count {
         return vec2u(0xffffffffu);
     }
-    let columns = (view.size.x + 7u) / 8u;
+    let columns = tile_counts().x;
     let tile = list.tiles[index];
     return 8u * vec2u(tile % columns, tile / columns) + local.xy;
 }

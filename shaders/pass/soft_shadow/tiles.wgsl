@@ -23,3 +23,17 @@ fn tile_steps(pixels: f32) -> u32 {
 fn tile_pack(holds: u32, steps: u32) -> u32 {
     return holds | (steps << TILE_HOLDS_BITS);
 }
+
+fn tile_counts() -> vec2u {
+    return (view.size + 7u) / 8u;
+}
+
+// Where the flag of a light stands in a list of them.
+fn tile_flag_word(tile: vec2u, light: u32) -> u32 {
+    let counts = tile_counts();
+    return ((light / 32u) * counts.y + tile.y) * counts.x + tile.x;
+}
+
+fn tile_flag(light: u32) -> u32 {
+    return 1u << (light % 32u);
+}

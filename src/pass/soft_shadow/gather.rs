@@ -1,9 +1,11 @@
 //! In image space: the hard test, the list of tiles that may hold a penumbra, the search for its radius there, and the blur.
 
-use super::{OccluderTest, OneLight, PenumbraSearch, ShadowMethod, SoftShadowInputs};
+use super::{Gathered, OccluderTest, OneLight, PenumbraSearch, ShadowMethod, ShadowTarget, SoftShadowInputs};
 use crate::gpu::{self as device, BindGroupCache, Bound, ComputeSpec, Slot};
+use crate::resource::PendingPenumbrae;
 #[cfg(feature = "bvh")]
 use crate::resource::bvh_geometry::BVH_SLOTS;
+use crate::resource::pending_penumbrae::tile_counts;
 use crate::{Error, wgsl};
 use std::sync::OnceLock;
 
@@ -43,6 +45,9 @@ pub(crate) const MAP_SLOTS: [Slot; 1] = [Slot::UintArray];
 /// Bindings of `shaders/pass/soft_shadow/list_tiles.wgsl`, in order.
 pub(crate) const LIST_SLOTS: [Slot; 3] = [Slot::Uniform, Slot::Storage, Slot::StorageMut];
 
+/// Bindings of `shaders/pass/soft_shadow/flag_tiles.wgsl`, in order.
+pub(crate) const FLAG_SLOTS: [Slot; 4] = [Slot::Uniform, Slot::Uniform, Slot::Storage, Slot::StorageMut];
+
 /// Bindings of `shaders/pass/soft_shadow/search_occluders.wgsl`, in order.
 pub(crate) const SEARCH_SLOTS: [Slot; 9] = [
     Slot::Uniform,
@@ -69,9 +74,6 @@ pub(crate) const BLUR_SLOTS: [Slot; 9] = [
     R32_FLOAT,
 ];
 
-/// Pixels along a tile's side, a workgroup's.
-const TILE: u32 = 8;
-
 /// Bytes of a list before the first tile.
 const HEADER_BYTES: u64 = std::mem::offset_of!(gpu::TileList, tiles) as u64;
 
@@ -88,6 +90,8 @@ pub(super) struct Gather {
     test_by_triangles: OnceLock<wgpu::ComputePipeline>,
     /// What follows the test, where a light has an extent.
     penumbra: OnceLock<Penumbra>,
+    /// What does where penumbrae are left to a later pass.
+    flag: OnceLock<Step>,
 }
 
 #[derive(Debug)]
@@ -110,6 +114,8 @@ struct Step {
 /// Textures, the list of tiles and bind groups, for one view.
 #[derive(Debug)]
 pub(super) struct GatherBuffers {
+    /// Whether the textures have the view's size.
+    has_steps: bool,
     /// Distances to occluders.
     occlusion: wgpu::TextureView,
     /// Visibility blurred along the first axis.
@@ -124,6 +130,7 @@ pub(super) struct GatherBuffers {
     #[cfg(feature = "bvh")]
     geometry_groups: BindGroupCache,
     list_groups: BindGroupCache,
+    flag_groups: BindGroupCache,
     search_groups: BindGroupCache,
     blur_groups: BindGroupCache,
     bytes: u64,
@@ -209,6 +216,7 @@ impl Gather {
             #[cfg(feature = "bvh")]
             test_by_triangles: OnceLock::new(),
             penumbra: OnceLock::new(),
+            flag: OnceLock::new(),
         }
     }
 
@@ -222,9 +230,24 @@ impl Gather {
         light: &OneLight<'_>,
     ) {
         self.record_test(device, encoder, buffers, inputs, light);
-        if light.settings.method == ShadowMethod::Hard {
-            return;
+        match (light.gathered, inputs.target) {
+            (Gathered::BySteps, _) => self.record_steps(device, encoder, buffers, inputs, light),
+            (Gathered::Later, ShadowTarget::Pending(pending)) => {
+                let flag = self.flag.get_or_init(|| Step::flag(device));
+                flag.record_flags(device, encoder, buffers, (inputs, light, pending));
+            }
+            _ => {}
         }
+    }
+
+    fn record_steps(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        buffers: &mut GatherBuffers,
+        inputs: &SoftShadowInputs<'_>,
+        light: &OneLight<'_>,
+    ) {
         let penumbra = self.penumbra.get_or_init(|| Penumbra::new(device, &self.map_layout));
         let maps = self.maps(device, buffers, inputs);
         penumbra.record_list(device, encoder, buffers, inputs);
@@ -298,6 +321,40 @@ impl Gather {
         }
         debug_assert_eq!(light.settings.test, OccluderTest::ShadowMaps);
         (&self.test, self.maps(device, buffers, inputs))
+    }
+}
+
+impl Step {
+    fn flag(device: &wgpu::Device) -> Self {
+        let label = "lightfall::SoftShadow::flag";
+        let layout = layout(device, label, &FLAG_SLOTS);
+        let shader = (wgsl::SOFT_SHADOW_FLAG, "flag_tiles");
+        Self {
+            pipeline: pipeline(device, label, shader, &[&layout], &[]),
+            layout,
+        }
+    }
+
+    fn record_flags(
+        &self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        buffers: &mut GatherBuffers,
+        (inputs, light, pending): (&SoftShadowInputs<'_>, &OneLight<'_>, &PendingPenumbrae),
+    ) {
+        let bound = [
+            light.params.into(),
+            inputs.g_buffer.view_buffer().into(),
+            (&buffers.tiles).into(),
+            pending.flags().into(),
+        ];
+        let label = "lightfall::SoftShadow::flag";
+        let group = buffers.flag_groups.get(device, label, &self.layout, &bound);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        let [columns, rows] = tile_counts(inputs.g_buffer.size());
+        pass.dispatch_workgroups(columns.div_ceil(8), rows.div_ceil(8), 1);
     }
 }
 
@@ -398,12 +455,9 @@ impl Penumbra {
     }
 }
 
-fn tile_counts(size: [u32; 2]) -> [u32; 2] {
-    size.map(|side| side.div_ceil(TILE))
-}
-
 impl GatherBuffers {
-    pub(super) fn new(device: &wgpu::Device, size: [u32; 2], lights: usize) -> Result<Self, Error> {
+    /// For a view of `size` pixels; the steps after the test for one of `gathered`.
+    pub(super) fn new(device: &wgpu::Device, size: [u32; 2], gathered: [u32; 2], lights: usize) -> Result<Self, Error> {
         use wgpu::{BufferUsages as B, TextureUsages as U};
         let specs = [
             "lightfall::SoftShadow::occlusion",
@@ -412,7 +466,7 @@ impl GatherBuffers {
         ]
         .map(|label| device::TextureSpec {
             label,
-            size,
+            size: gathered,
             layers: 1,
             format: wgpu::TextureFormat::R32Float,
             usage: U::TEXTURE_BINDING | U::STORAGE_BINDING,
@@ -428,6 +482,7 @@ impl GatherBuffers {
             list_usage,
         )?;
         Ok(Self {
+            has_steps: gathered == size,
             occlusion: view(&specs[0])?,
             across: view(&specs[1])?,
             radii: view(&specs[2])?,
@@ -439,9 +494,14 @@ impl GatherBuffers {
             #[cfg(feature = "bvh")]
             geometry_groups: BindGroupCache::default(),
             list_groups: BindGroupCache::default(),
+            flag_groups: BindGroupCache::for_uses(lights),
             search_groups: BindGroupCache::for_uses(lights),
             blur_groups: BindGroupCache::for_uses(3 * lights),
         })
+    }
+
+    pub(super) fn has_steps(&self) -> bool {
+        self.has_steps
     }
 
     pub(super) fn memory_use(&self) -> u64 {

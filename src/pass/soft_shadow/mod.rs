@@ -1,7 +1,7 @@
 //! Soft shadows of lamps with an extent.
 //!
 //! Inputs: [`GBuffer`], [`Lights`], [`ShadowMaps`], [`NearestOccluders`], and triangles for rays. Output: [`Visibility`], one
-//! layer a light. A light without extent gets the hard test of [`DirectLight`](super::DirectLight) and nothing else. One with an
+//! layer a light, or [`PendingPenumbrae`], where [`FusedComposite`](super::FusedComposite) does the gathering. A light without extent gets the hard test of [`DirectLight`](super::DirectLight) and nothing else. One with an
 //! extent has its penumbra found by a [`ShadowMethod`]:
 //!
 //! - *In image space* (`Cross`, `Disc`; `gather.rs`). A *test* says of each pixel whether the lamp's centre is seen, and how far
@@ -31,35 +31,14 @@ pub(crate) mod gather;
 pub(crate) mod over_pixels;
 
 use crate::gpu::{self as device};
+use crate::resource::pending_penumbrae::gpu::PenumbraParams;
 #[cfg(feature = "bvh")]
 use crate::resource::{BvhGeometry, bvh_geometry::BVH_SLOTS};
-use crate::resource::{GBuffer, Lights, NearestOccluders, ShadowMaps, Visibility};
+use crate::resource::{GBuffer, Lights, NearestOccluders, PendingPenumbrae, ShadowMaps, Visibility};
 use crate::{Error, Timestamps, wgsl};
 use gather::{Gather, GatherBuffers, MAP_SLOTS};
 use over_pixels::{OverPixels, OverPixelsGroups};
 use std::sync::OnceLock;
-
-pub(crate) mod gpu {
-    use bytemuck::{Pod, Zeroable};
-
-    /// Twin of `Params` in `shaders/pass/soft_shadow/receiver.wgsl`.
-    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-    #[repr(C)]
-    pub(crate) struct Params {
-        pub(crate) light: u32,
-        pub(crate) shadow_map_size: u32,
-        pub(crate) layer_count: u32,
-        pub(crate) search: u32,
-        pub(crate) search_taps: u32,
-        pub(crate) blur_taps: u32,
-        pub(crate) disc_taps: u32,
-        pub(crate) rays: u32,
-        pub(crate) sample_offset: u32,
-        pub(crate) is_gathered: u32,
-        pub(crate) max_radius: f32,
-        pub(crate) range_scale: f32,
-    }
-}
 
 /// Most taps to each side. More are not refused but not taken: at two hundred fetches a pixel the dither is long gone.
 pub(crate) const MAX_TAPS: u32 = 64;
@@ -186,6 +165,24 @@ impl SoftShadowSettings {
     }
 }
 
+/// What follows the hard test of a light. Twins of `GATHERED_NOT` and so on in `shaders/pass/soft_shadow/params.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Gathered {
+    Not,
+    BySteps,
+    Later,
+}
+
+/// Where a pass writes what it found.
+#[derive(Debug, Clone, Copy)]
+pub enum ShadowTarget<'a> {
+    /// All of it: visibility.
+    Visibility(&'a Visibility),
+    /// Without the gathering in image space, whether over a `Cross` or a `Disc`: [`FusedComposite`](super::FusedComposite) does it,
+    /// over a disc.
+    Pending(&'a PendingPenumbrae),
+}
+
 /// The pass. Pipelines of a method are made when it is first recorded.
 #[derive(Debug)]
 pub struct SoftShadow {
@@ -201,7 +198,7 @@ pub struct SoftShadow {
 pub struct SoftShadowResources {
     /// One a light: all lights of a frame are in one submission.
     params: Vec<wgpu::Buffer>,
-    written: Vec<Option<gpu::Params>>,
+    written: Vec<Option<PenumbraParams>>,
     gather: GatherBuffers,
     filter: OverPixelsGroups,
     #[cfg(feature = "bvh")]
@@ -225,7 +222,7 @@ pub struct SoftShadowInputs<'a> {
     #[cfg(feature = "bvh")]
     pub bvh: Option<&'a BvhGeometry>,
     /// Written, of the G-buffer's size. Lights beyond those that it, or the resources, have room for are left out.
-    pub visibility: &'a Visibility,
+    pub target: ShadowTarget<'a>,
     /// How to find penumbrae, one for each light; the last one counts for those beyond. None: shadows are hard.
     pub settings: &'a [SoftShadowSettings],
     /// Number of the frame where frames are accumulated: rays go elsewhere in each.
@@ -240,9 +237,27 @@ struct OneLight<'a> {
     layer: &'a wgpu::TextureView,
     params: &'a wgpu::Buffer,
     settings: SoftShadowSettings,
+    gathered: Gathered,
+}
+
+impl<'a> ShadowTarget<'a> {
+    fn layers(&self) -> &'a Visibility {
+        match self {
+            Self::Visibility(visibility) => visibility,
+            Self::Pending(pending) => pending.layers(),
+        }
+    }
 }
 
 impl<'a> SoftShadowInputs<'a> {
+    fn gathered(&self, settings: &SoftShadowSettings) -> Gathered {
+        match (settings.method, self.target) {
+            (ShadowMethod::Cross | ShadowMethod::Disc, ShadowTarget::Visibility(_)) => Gathered::BySteps,
+            (ShadowMethod::Cross | ShadowMethod::Disc, ShadowTarget::Pending(_)) => Gathered::Later,
+            _ => Gathered::Not,
+        }
+    }
+
     fn settings_of(&self, light: usize, has_extent: bool) -> SoftShadowSettings {
         let hard = SoftShadowSettings {
             method: ShadowMethod::Hard,
@@ -301,14 +316,19 @@ impl SoftShadow {
         inputs: &SoftShadowInputs<'_>,
     ) {
         encoder.push_debug_group("lightfall::SoftShadow");
-        let layers = (0..resources.params.len() as u32).map_while(|light| inputs.visibility.layer_view(light));
+        let layers = (0..resources.params.len() as u32).map_while(|light| inputs.target.layers().layer_view(light));
         for ((index, layer), has_extent) in (0..).zip(layers).zip(inputs.lights.have_extent()) {
-            let settings = inputs.settings_of(index, has_extent);
+            let mut settings = inputs.settings_of(index, has_extent);
+            if inputs.gathered(&settings) == Gathered::BySteps && !resources.gather.has_steps() {
+                settings.method = ShadowMethod::Hard;
+            }
+            let gathered = inputs.gathered(&settings);
             resources.write_params(index, inputs, &settings);
             let light = OneLight {
                 layer,
                 params: &resources.params[index],
                 settings,
+                gathered,
             };
             match settings.method {
                 ShadowMethod::Hard | ShadowMethod::Cross | ShadowMethod::Disc => {
@@ -342,14 +362,31 @@ impl SoftShadowResources {
     /// # Errors
     /// [`Error::LimitExceeded`].
     pub fn new(device: &wgpu::Device, size: [u32; 2], lights: u32) -> Result<Self, Error> {
+        Self::with_gather(device, lights, GatherBuffers::new(device, size, size, lights as usize)?)
+    }
+
+    /// The same without the textures, 12 bytes a pixel, that penumbrae are gathered by in image space: for other methods, and for
+    /// [`ShadowTarget::Pending`]. What would be gathered with them is hard.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`].
+    pub fn without_gathering(device: &wgpu::Device, size: [u32; 2], lights: u32) -> Result<Self, Error> {
+        Self::with_gather(
+            device,
+            lights,
+            GatherBuffers::new(device, size, [1, 1], lights as usize)?,
+        )
+    }
+
+    fn with_gather(device: &wgpu::Device, lights: u32, gather: GatherBuffers) -> Result<Self, Error> {
         let params = (0..lights)
-            .map(|_| device::uniform_buffer::<gpu::Params>(device, "lightfall::SoftShadow::params"))
+            .map(|_| device::uniform_buffer::<PenumbraParams>(device, "lightfall::SoftShadow::params"))
             .collect::<Result<Vec<_>, _>>()?;
         let uses = params.len();
         Ok(Self {
             written: vec![None; uses],
             params,
-            gather: GatherBuffers::new(device, size, uses)?,
+            gather,
             filter: OverPixelsGroups::new(uses),
             #[cfg(feature = "bvh")]
             trace: OverPixelsGroups::new(uses),
@@ -357,8 +394,7 @@ impl SoftShadowResources {
     }
 
     fn write_params(&mut self, light: usize, inputs: &SoftShadowInputs<'_>, settings: &SoftShadowSettings) {
-        let is_gathered = matches!(settings.method, ShadowMethod::Cross | ShadowMethod::Disc);
-        let params = gpu::Params {
+        let params = PenumbraParams {
             light: light as u32,
             shadow_map_size: inputs.shadow_maps.size(),
             layer_count: inputs.nearest.layers(),
@@ -371,12 +407,17 @@ impl SoftShadowResources {
                 ShadowMethod::Rays => inputs.sample_offset,
                 _ => 0,
             },
-            is_gathered: is_gathered.into(),
+            gathered: inputs.gathered(settings) as u32,
             max_radius: settings.max_radius,
             range_scale: settings.range_scale,
         };
+        let bytes = bytemuck::bytes_of(&params);
+        if let ShadowTarget::Pending(pending) = inputs.target {
+            inputs
+                .queue
+                .write_buffer(pending.params(), (light * bytes.len()) as u64, bytes);
+        }
         if self.written[light] != Some(params) {
-            let bytes = bytemuck::bytes_of(&params);
             inputs.queue.write_buffer(&self.params[light], 0, bytes);
             self.written[light] = Some(params);
         }
