@@ -24,16 +24,16 @@ const TRUTH_FRAMES: u32 = 8;
 const ROW: u32 = 64;
 
 pub(crate) struct Bench<'a> {
-    gpu: &'a Gpu,
-    size: u32,
-    g_buffer: GBuffer,
-    lights: Lights,
-    shadow_maps: ShadowMaps,
-    nearest: NearestOccluders,
-    bvh: BvhGeometry,
-    visibility: Visibility,
-    pass: SoftShadow,
-    own: SoftShadowResources,
+    pub(super) gpu: &'a Gpu,
+    pub(super) size: u32,
+    pub(super) g_buffer: GBuffer,
+    pub(super) lights: Lights,
+    pub(super) shadow_maps: ShadowMaps,
+    pub(super) nearest: NearestOccluders,
+    pub(super) bvh: BvhGeometry,
+    pub(super) visibility: Visibility,
+    pub(super) pass: SoftShadow,
+    pub(super) own: SoftShadowResources,
 }
 
 impl<'a> Bench<'a> {

@@ -12,12 +12,14 @@
 mod common;
 
 mod bench;
+mod fused;
 mod scenes;
 
 use bench::Bench;
 use clap::Parser;
 use common::adapter::{Gpu, Wishes};
 use common::{arguments, exr_file, lettering};
+use fused::Shading;
 use image::{Rgb, RgbImage};
 use lightfall::pass::{OccluderTest, PenumbraSearch, ShadowMethod, SoftShadowSettings};
 use scenes::{Edge, Named};
@@ -28,7 +30,7 @@ use std::path::{Path, PathBuf};
 #[derive(Parser)]
 struct Arguments {
     /// Which tables
-    #[arg(long, value_delimiter = ',', default_values = ["width", "errors", "cheapest", "tiles", "maps", "bias"])]
+    #[arg(long, value_delimiter = ',', default_values = ["width", "errors", "cheapest", "tiles", "fused", "maps", "bias"])]
     parts: Vec<String>,
     /// Pixels along an axis, a multiple of 64
     #[arg(long, default_value_t = 256, value_parser = multiple_of_64)]
@@ -187,6 +189,7 @@ impl Study<'_> {
                     rows = Some(measured);
                 }
                 "tiles" => self.tiles()?,
+                "fused" => self.fused()?,
                 "maps" => self.maps()?,
                 "bias" => self.bias()?,
                 _ => return Err(format!("no part named {part}").into()),
@@ -413,6 +416,37 @@ impl Study<'_> {
                 format!("{dark:.0}"),
                 format!("{:.2}", lit / soft),
             ]);
+        }
+        Ok(())
+    }
+
+    /// From the test to the picture.
+    fn fused(&mut self) -> Result<(), Box<dyn std::error::Error>> {
+        let size = 2 * self.arguments.size;
+        let title = format!(
+            "One pass after the other, or all in one, {size} × {size}, indirect light at a quarter along each axis"
+        );
+        let columns = [
+            "lights, penumbra",
+            "cross 4 + 5: ns a pixel",
+            "disc 4 + 32",
+            "disc 4 + 32 in one pass",
+            "bytes a pixel allocated: cross or disc, in one pass",
+            "moved at the least: cross, disc, in one pass",
+        ];
+        self.head(&title, &columns);
+        let settings = ["cross 4 + 5", "disc 4 + 32"].map(|n| way(n).settings);
+        let pixels = f64::from(size * size);
+        for (what, scene, tiles) in scenes::shaded() {
+            let mut bench = Bench::new(&self.gpu, &scene, size, self.arguments.map_size)?;
+            let costs = Shading::new(&mut bench)?.costs(&settings, self.arguments.rounds)?;
+            let mut cells = vec![what];
+            cells.extend(costs.iter().map(|c| format!("{:.0}", c.ms * 1e6 / pixels)));
+            let allocated = [0, 2].map(|i| format!("{:.0}", costs[i].allocated as f64 / pixels));
+            cells.push(allocated.join(", "));
+            let moved: Vec<_> = costs.iter().map(|c| c.moved[tiles].to_string()).collect();
+            cells.push(moved.join(", "));
+            self.row(&cells);
         }
         Ok(())
     }

@@ -129,6 +129,29 @@ pub(crate) fn slats(beside: f64) -> Scene {
     scene
 }
 
+/// The slats under some lamps beside each other, so that all is penumbra or none is: what it is, and 1 if all is.
+pub(crate) fn shaded() -> Vec<(String, Scene, usize)> {
+    let views = [("all", 0.0, 1), ("none", 1.6, 0)];
+    let counts = [1, 4, 16];
+    let all = counts.iter().flat_map(|&count| views.map(|view| (count, view)));
+    all.map(|(count, (share, beside, tiles))| {
+        let mut scene = slats(beside);
+        let lamp = scene.lights.remove(0);
+        for i in 0..count {
+            let LightKind::Rectangle { center, half_u, half_v } = lamp.kind else {
+                continue;
+            };
+            scene.lights.push(light(LightKind::Rectangle {
+                center: center + 0.1 * f64::from(i) / f64::from(count) * DVec3::Z,
+                half_u,
+                half_v,
+            }));
+        }
+        (format!("{count}, {share}"), scene, tiles)
+    })
+    .collect()
+}
+
 /// A scene and what it is a picture of.
 pub(crate) struct Named {
     pub(crate) name: &'static str,

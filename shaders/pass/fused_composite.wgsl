@@ -32,6 +32,9 @@ struct Counts {
 @group(0) @binding(19) var<storage, read> nearest: array<f32>;
 @group(0) @binding(20) var<storage, read> flags: array<u32>;
 
+// Whether anything was found of lights beforehand.
+override HAS_PENUMBRAE: bool;
+
 // Of the light in hand.
 var<private> params: Params;
 
@@ -70,7 +73,7 @@ fn direct_at(at: vec2u) -> vec3f {
         if !any(e > vec3f(0.0)) {
             continue;
         }
-        if i < counts.layers {
+        if HAS_PENUMBRAE && i < counts.layers {
             sum += e * visibility_of(i, at);
         } else if is_lit(lights[i], p, n, counts.shadow_map_size) {
             sum += e;

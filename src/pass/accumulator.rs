@@ -60,7 +60,13 @@ impl Accumulator {
     pub fn new(device: &wgpu::Device) -> Self {
         let formats = [Self::FORMAT; 2];
         Self {
-            pass: FullScreen::new(device, "lightfall::Accumulator", wgsl::ACCUMULATOR, &SLOTS, &formats),
+            pass: FullScreen::new(
+                device,
+                "lightfall::Accumulator",
+                (wgsl::ACCUMULATOR, &[]),
+                &SLOTS,
+                &formats,
+            ),
         }
     }
 

@@ -130,7 +130,13 @@ impl Composite {
     /// The pass for targets of `format`: `rgba32float` unscaled, or a narrower one with a pre-exposure.
     pub fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
         Self {
-            pass: FullScreen::new(device, "lightfall::Composite", wgsl::COMPOSITE, &SLOTS, &[format]),
+            pass: FullScreen::new(
+                device,
+                "lightfall::Composite",
+                (wgsl::COMPOSITE, &[]),
+                &SLOTS,
+                &[format],
+            ),
         }
     }
 

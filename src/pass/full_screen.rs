@@ -23,7 +23,7 @@ impl FullScreen {
     pub(super) fn new(
         device: &wgpu::Device,
         label: &'static str,
-        source: &'static str,
+        (source, constants): (&'static str, &[(&str, f64)]),
         slots: &[Slot],
         formats: &[wgpu::TextureFormat],
     ) -> Self {
@@ -36,7 +36,7 @@ impl FullScreen {
                 source,
                 fragment: "fragment",
                 layouts: &[&layout],
-                constants: &[],
+                constants,
                 buffers: &[],
                 topology: wgpu::PrimitiveTopology::TriangleList,
                 cull_mode: None,

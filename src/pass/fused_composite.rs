@@ -20,6 +20,7 @@ use crate::resource::{
     Environment, GBuffer, Irradiance, Lights, NearestOccluders, PendingPenumbrae, Radiance, ShadowMaps, Subsampling,
 };
 use crate::{Error, Timestamps, wgsl};
+use std::sync::OnceLock;
 
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
@@ -59,10 +60,13 @@ pub(crate) const SLOTS: [Slot; 21] = [
     Slot::Storage,
 ];
 
-/// The pass.
+/// The pass. Each of its pipelines is made when it is first recorded.
 #[derive(Debug)]
 pub struct FusedComposite {
-    pass: FullScreen,
+    device: wgpu::Device,
+    format: wgpu::TextureFormat,
+    /// Without penumbrae, and with.
+    passes: [OnceLock<FullScreen>; 2],
 }
 
 /// Uniforms and bind groups for one view.
@@ -112,10 +116,19 @@ pub struct FusedCompositeInputs<'a> {
 impl FusedComposite {
     /// The pass for targets of `format`: `rgba32float` unscaled, or a narrower one with a pre-exposure.
     pub fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
-        let label = "lightfall::FusedComposite";
         Self {
-            pass: FullScreen::new(device, label, wgsl::FUSED_COMPOSITE, &SLOTS, &[format]),
+            device: device.clone(),
+            format,
+            passes: Default::default(),
         }
+    }
+
+    fn pass(&self, has_penumbrae: bool) -> &FullScreen {
+        let constants = [("HAS_PENUMBRAE", f64::from(u8::from(has_penumbrae)))];
+        let shader = (wgsl::FUSED_COMPOSITE, &constants[..]);
+        let label = "lightfall::FusedComposite";
+        let new = || FullScreen::new(&self.device, label, shader, &SLOTS, &[self.format]);
+        self.passes[usize::from(has_penumbrae)].get_or_init(new)
     }
 
     /// Records the pass.
@@ -152,8 +165,13 @@ impl FusedComposite {
             pending.flags().into(),
         ];
         let targets = [inputs.radiance.view()];
-        self.pass
-            .record(encoder, &mut resources.inner, &bound, &targets, inputs.timestamps);
+        self.pass(inputs.penumbrae.is_some()).record(
+            encoder,
+            &mut resources.inner,
+            &bound,
+            &targets,
+            inputs.timestamps,
+        );
     }
 }
 

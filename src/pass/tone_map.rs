@@ -86,7 +86,7 @@ impl ToneMap {
     /// The pass for targets of `format`.
     pub fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
         Self {
-            pass: FullScreen::new(device, "lightfall::ToneMap", wgsl::TONE_MAP, &SLOTS, &[format]),
+            pass: FullScreen::new(device, "lightfall::ToneMap", (wgsl::TONE_MAP, &[]), &SLOTS, &[format]),
         }
     }
 
