@@ -96,7 +96,7 @@ struct Rendered {
 }
 
 fn render(gpu: &Gpu, scene: &Scene, settings: &SoftShadowSettings, size: u32, map_size: u32) -> Rendered {
-    render_by(gpu, scene, std::slice::from_ref(settings), size, map_size, None)
+    render_by(gpu, scene, std::slice::from_ref(settings), (size, map_size), None)
 }
 
 /// As [`render`]; `given` lights the surfaces instead of what was gathered.
@@ -104,8 +104,7 @@ fn render_by(
     gpu: &Gpu,
     scene: &Scene,
     settings: &[SoftShadowSettings],
-    size: u32,
-    map_size: u32,
+    (size, map_size): (u32, u32),
     given: Option<&Visibility>,
 ) -> Rendered {
     let (device, queue) = (&gpu.device, &gpu.queue);
@@ -736,7 +735,7 @@ fn a_hosts_own_visibility_counts_like_the_crates() {
     let visibility = Visibility::from_view(&texture.create_view(&Default::default())).unwrap();
     assert_eq!((visibility.lights(), visibility.memory_use()), (1, 0));
     assert!(visibility.layer_view(0).is_none(), "it cannot be written");
-    let given = render_by(&gpu, &scene, &[FOUR_PLUS_FIVE()], SIZE, 256, Some(&visibility));
+    let given = render_by(&gpu, &scene, &[FOUR_PLUS_FIVE()], (SIZE, 256), Some(&visibility));
     let is_half = |(given, own): (&[f32; 4], &[f32; 4])| (0..3).all(|c| given[c] == 0.5 * own[c]);
     assert!(given.by_layers.iter().zip(&own.by_layers).all(is_half));
     assert_no_errors(&gpu);
@@ -951,19 +950,19 @@ fn each_light_may_have_a_method_of_its_own() {
     });
     scene.lights.push(other);
     let methods = [ShadowMethod::Pcss, ShadowMethod::Hard];
-    let each = render_by(&gpu, &scene, &methods.map(by), SIZE, 256, None);
+    let each = render_by(&gpu, &scene, &methods.map(by), (SIZE, 256), None);
     for (light, method) in methods.into_iter().enumerate() {
         let alone = render(&gpu, &scene, &by(method), SIZE, 256);
         assert!(each.layers[light] == alone.layers[light], "{method:?}");
     }
     // The last entry counts for lights beyond; none at all is hard.
-    let last = render_by(&gpu, &scene, &[by(ShadowMethod::Disc)], SIZE, 256, None);
+    let last = render_by(&gpu, &scene, &[by(ShadowMethod::Disc)], (SIZE, 256), None);
     assert!(
         last.layers
             .iter()
             .all(|layer| layer.iter().any(|v| *v > 0.0 && *v < 1.0))
     );
-    let none = render_by(&gpu, &scene, &[], SIZE, 256, None);
+    let none = render_by(&gpu, &scene, &[], (SIZE, 256), None);
     assert!(none.layers.iter().flatten().all(|v| [0.0, 1.0].contains(v)));
     assert_no_errors(&gpu);
 }
