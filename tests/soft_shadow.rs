@@ -987,7 +987,13 @@ fn the_renderer_spends_on_the_brightest_lights_and_asks_for_triangles() {
         let size = [SIZE, 64];
         let mut offline = Offline::new(&gpu, scene.clone(), settings, 0, size, Component::Direct).unwrap();
         offline.render_frame(None).unwrap();
-        let all = read_layers(&gpu, offline.view.visibility().unwrap());
+        let visibility = offline.view.visibility();
+        let is_on = offline.renderer.plan().unwrap().is_on(Stage::SoftShadow);
+        assert_eq!(is_on, visibility.is_some());
+        let Some(visibility) = visibility else {
+            return [false; 2];
+        };
+        let all = read_layers(&gpu, visibility);
         let is_soft = |layer: &[f32]| layer.iter().any(|v| *v > 0.0 && *v < 1.0);
         let pixels = (size[0] * size[1]) as usize;
         [is_soft(&all[..pixels]), is_soft(&all[pixels..2 * pixels])]
@@ -996,5 +1002,158 @@ fn the_renderer_spends_on_the_brightest_lights_and_asks_for_triangles() {
     assert_eq!(layers(&settings("soft_shadow.lights", "1")), [false, true]);
     assert_eq!(layers(&settings("soft_shadow.lights", "0")), [false, false]);
     assert_eq!(layers(&settings("soft_shadow.method", "rays")), [true, true]);
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn accumulated_rays_go_elsewhere_in_each_frame_without_indirect_light_too() {
+    let Some(gpu) = gpu() else { return };
+    for overrides in [
+        [("bounces", "0"), ("photons", "1000")],
+        [("bounces", "3"), ("photons", "0")],
+    ] {
+        let mut settings = Settings {
+            shadow_map_size: 128,
+            frames: 2,
+            ..Settings::fast()
+        };
+        let rays = [("soft_shadow.method", "rays"), ("soft_shadow.rays", "1")];
+        for (name, value) in overrides.into_iter().chain(rays) {
+            settings.set(name, value).unwrap();
+        }
+        let size = [64, 64];
+        let scene = samples::penumbra(0.0);
+        let mut offline = Offline::new(&gpu, scene, &settings, 0, size, Component::Direct).unwrap();
+        let mut layer = || {
+            offline.render_frame(None).unwrap();
+            read_layers(&gpu, offline.view.visibility().unwrap())
+        };
+        let (first, second) = (layer(), layer());
+        let differ = first.iter().zip(&second).filter(|(a, b)| a != b).count();
+        assert!(differ > 50, "{overrides:?}: {differ}");
+    }
+    assert_no_errors(&gpu);
+}
+
+/// Pixels of which all around, so many to each side, are equal.
+fn is_inside(layer: &[f32], size: u32, reach: i64, pixel: u32) -> bool {
+    let (x, y) = (i64::from(pixel % size), i64::from(pixel / size));
+    let own = layer[pixel as usize];
+    (-reach..=reach).all(|dy| {
+        (-reach..=reach).all(|dx| {
+            let at = [x + dx, y + dy].map(|c| c.clamp(0, i64::from(size) - 1) as u32);
+            layer[(at[1] * size + at[0]) as usize] == own
+        })
+    })
+}
+
+#[test]
+fn hard_shadows_have_no_acne_and_stay_at_their_casters() {
+    let Some(gpu) = gpu() else { return };
+    const MAP: u32 = 256;
+    let size = SIZE;
+    // A floor, blocks that stand on it, a ramp and a plate just over it.
+    let mut scene = Scene::default();
+    level(&mut scene, 0.0, [-1.0, -1.0], [1.0, 1.0]);
+    let at = |x, y, z| DVec3::new(x, y, z);
+    for (x, height) in [(-0.5, 0.4), (0.1, 0.05)] {
+        let (a, b) = (x - 0.1, x + 0.1);
+        level(&mut scene, height, [a, -0.1], [b, 0.1]);
+        quad(
+            &mut scene,
+            [at(a, 0.0, 0.1), at(b, 0.0, 0.1), at(b, height, 0.1), at(a, height, 0.1)],
+        );
+        quad(
+            &mut scene,
+            [
+                at(b, 0.0, 0.1),
+                at(b, 0.0, -0.1),
+                at(b, height, -0.1),
+                at(b, height, 0.1),
+            ],
+        );
+        quad(
+            &mut scene,
+            [
+                at(b, 0.0, -0.1),
+                at(a, 0.0, -0.1),
+                at(a, height, -0.1),
+                at(b, height, -0.1),
+            ],
+        );
+        quad(
+            &mut scene,
+            [
+                at(a, 0.0, -0.1),
+                at(a, 0.0, 0.1),
+                at(a, height, 0.1),
+                at(a, height, -0.1),
+            ],
+        );
+    }
+    quad(
+        &mut scene,
+        [
+            at(0.4, 0.0, 0.5),
+            at(0.9, 0.4, 0.5),
+            at(0.9, 0.4, -0.5),
+            at(0.4, 0.0, -0.5),
+        ],
+    );
+    level(&mut scene, 0.02, [-0.2, 0.4], [0.2, 0.7]);
+    scene
+        .cameras
+        .push(parallel_camera(DVec3::ZERO, at(0.3, -1.0, -0.6), 3.0, 1.1));
+    let by_rays = SoftShadowSettings {
+        test: OccluderTest::Triangles,
+        ..by(ShadowMethod::Hard)
+    };
+    for height in [2.0, 0.7, 0.2] {
+        let toward = at(-1.2, height, 0.7);
+        let kinds = [
+            LightKind::Point {
+                position: toward,
+                radius: 0.0,
+            },
+            LightKind::Spot {
+                position: toward,
+                direction: -toward,
+                inner_angle: 1.0,
+                outer_angle: 1.3,
+                radius: 0.0,
+            },
+            LightKind::Directional {
+                direction: -toward,
+                angle: 0.0,
+            },
+        ];
+        for kind in kinds {
+            let mut scene = scene.clone();
+            // The triangles' test needs an extent; its middle is what is tested.
+            let mut soft = light(kind);
+            match &mut soft.kind {
+                LightKind::Point { radius, .. } | LightKind::Spot { radius, .. } => *radius = 1e-3,
+                LightKind::Directional { angle, .. } => *angle = 1e-3,
+                _ => {}
+            }
+            scene.lights.push(soft);
+            let exact = &render(&gpu, &scene, &by_rays, size, MAP).layers[0];
+            let found = &render(&gpu, &scene, &by(ShadowMethod::Hard), size, MAP).layers[0];
+            // Two texels of the map, where it is coarsest: an eighth of a quarter turn from the light away.
+            let texel = 2.0 * 2.5 / f64::from(MAP);
+            let reach = (2.0 * texel / (2.2 / f64::from(size))).ceil() as i64;
+            let wrong = |of: f32| {
+                let inside = (0..size * size).filter(|&i| exact[i as usize] == of && is_inside(exact, size, reach, i));
+                let (all, wrong) = inside.fold((0, 0), |(all, wrong), i| {
+                    (all + 1, wrong + u32::from(found[i as usize] != of))
+                });
+                assert!(all > 100, "{kind:?}: {all} pixels of {of}");
+                wrong
+            };
+            let (dark, lit) = (wrong(1.0), wrong(0.0));
+            println!("{kind:?}: reach {reach}, {dark} dark by mistake, {lit} lit by mistake");
+            assert_eq!((dark, lit), (0, 0), "{kind:?}");
+        }
+    }
     assert_no_errors(&gpu);
 }

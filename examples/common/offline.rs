@@ -126,7 +126,7 @@ impl<'a> Offline<'a> {
         self.renderer.prepare(queue, &mut self.geometry, &mut cameras)?;
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let geometry: &dyn Geometry = &self.geometry;
-        let sample_offset = accumulated.wrapping_mul(self.renderer.settings().photons);
+        let sample_offset = accumulated.wrapping_mul(self.renderer.settings().photons.max(1));
         let scene_inputs = SceneInputs {
             queue,
             geometry,

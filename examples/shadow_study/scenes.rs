@@ -47,6 +47,22 @@ fn bulb(position: [f64; 3], radius: f64) -> Light {
     light(LightKind::Point { position, radius })
 }
 
+/// Parallel light from a disc that subtends twice this angle.
+fn sun(direction: [f64; 3], angle: f64) -> Light {
+    let direction = DVec3::from(direction).normalize();
+    light(LightKind::Directional { direction, angle })
+}
+
+fn spot(position: [f64; 3], direction: [f64; 3], radius: f64) -> Light {
+    light(LightKind::Spot {
+        position: DVec3::from(position),
+        direction: DVec3::from(direction).normalize(),
+        inner_angle: 0.4,
+        outer_angle: 0.6,
+        radius,
+    })
+}
+
 /// Straight down, parallel, at a square of `2 * half`, from `height` above the floor.
 fn from_above(height: f64, half: f64) -> Camera {
     Camera {
@@ -129,12 +145,19 @@ pub(crate) fn slats(beside: f64) -> Scene {
     scene
 }
 
-/// The slats under some lamps beside each other, so that all is penumbra or none is: what it is, and 1 if all is.
-pub(crate) fn shaded() -> Vec<(String, Scene, usize)> {
-    let views = [("all", 0.0, 1), ("none", 1.6, 0)];
+/// The slats under some lamps beside each other.
+pub(crate) struct Shaded {
+    pub(crate) what: String,
+    pub(crate) scene: Scene,
+    /// Everywhere; else nowhere.
+    pub(crate) is_penumbra: bool,
+}
+
+pub(crate) fn shaded() -> Vec<Shaded> {
+    let views = [("all", 0.0), ("none", 1.6)];
     let counts = [1, 4, 16];
     let all = counts.iter().flat_map(|&count| views.map(|view| (count, view)));
-    all.map(|(count, (share, beside, tiles))| {
+    all.map(|(count, (share, beside))| {
         let mut scene = slats(beside);
         let lamp = scene.lights.remove(0);
         for i in 0..count {
@@ -147,7 +170,11 @@ pub(crate) fn shaded() -> Vec<(String, Scene, usize)> {
                 half_v,
             }));
         }
-        (format!("{count}, {share}"), scene, tiles)
+        Shaded {
+            what: format!("{count}, {share}"),
+            scene,
+            is_penumbra: beside == 0.0,
+        }
     })
     .collect()
 }
@@ -219,5 +246,22 @@ pub(crate) fn all() -> Vec<Named> {
             }
             block(scene, [0.5, 0.0, -0.4], [0.7, 0.35, -0.2]);
         }),
+        on_floor("sun", camera(), sun([0.5, -1.0, -0.35], 0.04), |scene| {
+            block(scene, [-0.9, 0.0, -0.4], [-0.6, 1.0, -0.1]);
+            // A roof of laths.
+            for i in 0..8 {
+                let x = -0.2 + 0.12 * f64::from(i);
+                level(scene, 0.8, [x, -0.6], [x + 0.05, 0.5]);
+            }
+        }),
+        on_floor(
+            "spot",
+            camera(),
+            spot([1.2, 2.2, 0.8], [-1.2, -2.2, -0.8], 0.12),
+            |scene| {
+                block(scene, [-0.2, 0.0, -0.2], [0.1, 0.6, 0.1]);
+                level(scene, 0.9, [0.3, -0.5], [0.5, 0.9]);
+            },
+        ),
     ]
 }

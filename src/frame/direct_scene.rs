@@ -23,7 +23,7 @@ pub(super) struct DirectScene {
     pub(super) shadow_maps: ShadowMaps,
     layers: u32,
     capture: ShadowMapCaptureResources,
-    /// While a light has an extent.
+    /// While penumbrae are looked for.
     nearest: Option<(NearestOccluders, NearestOccluderResources)>,
 }
 
@@ -63,7 +63,7 @@ impl DirectScene {
         Ok(())
     }
 
-    /// While a light has an extent.
+    /// While penumbrae are looked for.
     pub(super) fn nearest(&self) -> Option<&NearestOccluders> {
         self.nearest.as_ref().map(|n| &n.0)
     }

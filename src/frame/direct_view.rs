@@ -21,7 +21,7 @@ pub(super) struct DirectPasses {
 /// Allocated while anything shines.
 #[derive(Debug)]
 pub(super) struct DirectView {
-    /// While a light has an extent.
+    /// While penumbrae are looked for.
     shadows: Option<(Shadows, SoftShadowResources)>,
     shading: Shading,
 }
@@ -142,7 +142,7 @@ impl DirectView {
         }
     }
 
-    /// How much of each light is seen, if one has an extent and it is not left to the sum.
+    /// How much of each light is seen, while penumbrae are looked for and that is not left to the sum.
     pub(super) fn visibility(&self) -> Option<&Visibility> {
         match &self.shadows {
             Some((Shadows::Found(visibility), _)) => Some(visibility),

@@ -62,7 +62,7 @@ pub struct GiRenderer {
     env_map_layers: Vec<u32>,
     /// That photons were last traced in.
     photons_frame: Option<UnitFrame>,
-    /// Of the photons.
+    /// Of the photons, and of rays to lamps.
     sample_offset: u32,
     guiding: GuidingSchedule,
     /// This frame's share of the selection, and its views.
@@ -127,8 +127,8 @@ pub struct SceneInputs<'a> {
     /// The same geometry as triangles, prepared for this frame: what [`Stage::BvhTracer`] needs while it is on.
     #[cfg(feature = "bvh")]
     pub bvh: Option<&'a BvhGeometry>,
-    /// First index into the random sequence: constant in real time; advanced by the number of photons per frame when
-    /// accumulating.
+    /// First index into the random sequence: constant in real time; advanced by the number of photons per frame, or by 1 if there
+    /// are none, when accumulating.
     pub sample_offset: u32,
     /// Sink for GPU time.
     pub timestamps: Option<&'a Timestamps>,
@@ -538,6 +538,7 @@ impl GiRenderer {
     pub fn record_scene(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) -> Result<(), Error> {
         #[cfg(feature = "bvh")]
         self.check_triangles(inputs)?;
+        self.sample_offset = inputs.sample_offset;
         self.record_shadow_maps(encoder, inputs);
         self.record_selection(encoder, inputs);
         self.record_photons(encoder, inputs)
@@ -559,7 +560,6 @@ impl GiRenderer {
             indirect.record(encoder, &self.passes.photons, &photon_inputs)?;
             self.recapture.recorded();
             self.photons_frame = self.state.as_ref().map(|s| s.frame);
-            self.sample_offset = inputs.sample_offset;
         }
         Ok(())
     }

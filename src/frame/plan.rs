@@ -120,7 +120,10 @@ impl Plan {
                 sources(summary.lights_with_extent, summary, settings)
             ),
         };
-        let soft = (lit.0 && has_extent, soft);
+        let soft = match (lit.0 && has_extent, settings.finds_penumbrae()) {
+            (true, false) => (false, "settings want hard shadows".to_owned()),
+            (is_on, _) => (is_on, soft),
+        };
         let stage = |stage, (on, reason): (bool, String)| PlannedStage { stage, on, reason };
         let always = |reason: &str| (true, reason.to_owned());
         let nearest = match settings.soft_shadow.searches() {

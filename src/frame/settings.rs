@@ -392,6 +392,12 @@ impl Settings {
         all
     }
 
+    /// Whether shadows of lights with an extent are another's than those of points by shadow maps.
+    pub(super) fn finds_penumbrae(&self) -> bool {
+        let shadow = &self.soft_shadow;
+        self.soft_lights > 0 && (shadow.method != ShadowMethod::Hard || shadow.uses_triangles())
+    }
+
     /// Whether there are environment maps.
     pub(super) fn needs_env_maps(&self) -> bool {
         self.tracer_kind.uses_env_maps() || self.indirect_method == IndirectMethod::FinalGather

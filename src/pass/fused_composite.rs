@@ -5,10 +5,10 @@
 //! [`NearestOccluders`], indirect [`Irradiance`] of some [`Subsampling`], what [`SpecularPaths`](super::SpecularPaths) gives, and the
 //! [`Environment`]. Output: [`Radiance`]. It stands for the steps of `SoftShadow` after its test, [`Upsampler`](super::Upsampler),
 //! [`DirectLight`](super::DirectLight) and `Composite`, and gives what they give with [`ShadowMethod::Disc`](super::ShadowMethod)
-//! and samples interpolated at once, to rounding. Between them no visibility, no radius and no irradiance of all pixels is written and read again:
-//! `docs/shadows.md` has bytes and times of both.
+//! and samples interpolated at once, to rounding. Between them no visibility, no radius and no irradiance of all pixels is
+//! written and read again: `docs/shadows.md` has bytes and times of both.
 //!
-//! Cost: one full-screen pass; a pixel that may lie in a penumbra takes 4 `search_taps` + `disc_taps` fetches a light. Source: Yao et
+//! Cost: one full-screen pass; a pixel that may lie in a penumbra takes 4 `search_taps` + `disc_taps` taps of two fetches a light. Source: Yao et
 //! al., soft shadows and image-space photon mapping, section 3.4 (soft shadow, up-sampling and sum in one pass), with the changes that
 //! the passes it stands for have. Limits: theirs; pixels that up-sampling leaves in doubt are not estimated anew, and there is no
 //! irradiance for a host to look at or to filter.

@@ -21,7 +21,7 @@
 //! Cost: pixels × lights with an extent × taps: of `Cross`, in listed tiles alone, 4 `search_taps` + 4 `blur_taps` + 2 of two
 //! fetches; of `Pcss` 4 `search_taps` + `disc_taps` tests; `docs/shadows.md` measures them.
 //!
-//! Limits: in image space, a penumbra whose shadow lies off the screen as a whole is not looked for (what else is off the screen, or
+//! Limits: in image space, a penumbra whose shadow lies off the screen, or hidden, as a whole is not looked for (what else is off the screen, or
 //! hidden, is asked of the shadow maps); penumbrae wider than `max_radius` are cut to it; the blur of an edge that slants between
 //! the axes of a `Cross` reaches up to √2 radii. In shadow maps, the receiver's plane is taken to go on below other surfaces. In both, one mean distance stands for occluders behind each
 //! other; a spot's disc is taken to face the receiver, a flat lamp is the disc of its area; receivers tilted beyond 83° count as
@@ -116,7 +116,7 @@ pub struct SoftShadowSettings {
 
 impl Default for SoftShadowSettings {
     /// "4 + 5" of the paper's Table 1: of the ways that cost as much none is off by less in all scenes of `docs/shadows.md`, and
-    /// where there is no penumbra it costs a third of `Pcss`. Grain goes by the number of taps and not by how far apart they
+    /// where there is no penumbra it costs a fifth of `Pcss` of the same error. Grain goes by the number of taps and not by how far apart they
     /// are, so that the widest radius only bounds how scattered fetches are; a quarter of a 512-pixel image leaves common
     /// penumbrae alone. The error is the same for any range scale from 0.05 to 1; one in the middle.
     fn default() -> Self {
@@ -135,8 +135,8 @@ impl Default for SoftShadowSettings {
 }
 
 impl SoftShadowSettings {
-    /// `Pcss` with 64 taps of search and 128 of filtering: a third to a half of the default's error, for some three times its time
-    /// (`docs/shadows.md`).
+    /// `Pcss` with 64 taps of search and 128 of filtering: a third to two thirds of the default's error, for some three times its
+    /// time; as much error where occluders stand behind each other, where light grazes and inside of a lampshade (`docs/shadows.md`).
     pub fn accurate() -> Self {
         Self {
             method: ShadowMethod::Pcss,
@@ -400,7 +400,7 @@ impl SoftShadowResources {
             layer_count: inputs.nearest.layers(),
             search: settings.searches().into(),
             search_taps: settings.search_taps.min(MAX_TAPS),
-            blur_taps: settings.blur_taps.min(MAX_TAPS),
+            blur_taps: settings.blur_taps.clamp(1, MAX_TAPS),
             disc_taps: settings.disc_taps.clamp(1, MAX_POINTS),
             rays: settings.rays.clamp(1, MAX_POINTS),
             sample_offset: match settings.method {
