@@ -48,7 +48,9 @@ enum Tracer {
 #[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum Method {
     Splatting,
-    /// Not available yet.
+    /// By rays to lit environment maps
+    FinalGather,
+    /// By points on surfaces that stand for the light around them
     SurfaceLights,
     /// Not available yet.
     IlluminationMaps,
@@ -58,7 +60,7 @@ enum Method {
 #[derive(Parser)]
 #[command(
     args_override_self = true,
-    after_help = "Not available yet: --method surface-lights|illumination-maps, --budget-ms, glTF skins."
+    after_help = "Not available yet: --method illumination-maps, --budget-ms, glTF skins."
 )]
 struct Arguments {
     /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, plane, furnace, two-rooms, pillars,
@@ -85,9 +87,9 @@ struct Arguments {
     /// How photons find what they hit (default: the preset's)
     #[arg(long, value_enum)]
     tracer: Option<Tracer>,
-    /// How indirect light is represented
-    #[arg(long, value_enum, default_value = "splatting")]
-    method: Method,
+    /// How indirect light comes to pixels (default: the preset's)
+    #[arg(long, value_enum)]
+    method: Option<Method>,
     /// Light from all around, instead of the scene's own: an equirectangular .exr or .hdr file, or radiance R,G,B
     #[arg(long, value_name = "FILE|R,G,B")]
     environment: Option<String>,
@@ -340,8 +342,8 @@ fn check_available(arguments: &Arguments) -> Result<Component, String> {
     if arguments.budget_ms.is_some() {
         return not_yet("--budget-ms");
     }
-    if arguments.method != Method::Splatting {
-        return not_yet("--method surface-lights and illumination-maps");
+    if arguments.method == Some(Method::IlluminationMaps) {
+        return not_yet("--method illumination-maps");
     }
     match arguments.component {
         Part::All => Ok(Component::All),
@@ -368,6 +370,9 @@ fn settings(arguments: &Arguments) -> Result<Settings, String> {
     }
     if let Some(tracer) = arguments.tracer.and_then(|t| t.to_possible_value()) {
         set("tracer.kind", tracer.get_name())?;
+    }
+    if let Some(method) = arguments.method.and_then(|m| m.to_possible_value()) {
+        set("indirect.method", method.get_name())?;
     }
     if let Some(bounces) = arguments.bounces {
         set("bounces", &bounces.to_string())?;

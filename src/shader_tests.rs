@@ -6,14 +6,15 @@ use crate::pass::photon_splatter::{raster, tiled};
 use crate::pass::{
     accumulator, composite, depth_hierarchy_build, direct_light, env_map_lighting, env_map_selector, final_gather,
     fused_composite, glossy_light, image_space_tracer, irradiance_filter, nearest_occluder, photon_emitter,
-    photon_grid, photon_guiding, photon_splatter, photon_walk, soft_shadow, specular_paths, stable_sort, tone_map,
-    trace_statistics, upsampler,
+    photon_grid, photon_guiding, photon_splatter, photon_stream, photon_walk, soft_shadow, specular_paths, stable_sort,
+    surface_light_shading, tone_map, trace_statistics, upsampler,
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
 use crate::resource::{
     MAX_LIGHTS, Photon, PhotonMap, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, environment, g_buffer,
-    guiding_tables, lights, lost_rays, marked_pixels, mesh_geometry, pending_penumbrae, photon_targets, view,
+    guiding_tables, lights, lost_rays, marked_pixels, mesh_geometry, pending_penumbrae, photon_pool, photon_targets,
+    surface_lights, view,
 };
 use crate::scene::Material;
 use crate::wgsl;
@@ -369,6 +370,17 @@ fn twins() -> Vec<Twin> {
         }),
         twin!(wgsl::PHOTON_EMITTER, "EmissionTable", guiding_tables::gpu::EmissionTable { columns, rows }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "ReflectionTable", guiding_tables::gpu::ReflectionTable { columns, rows }),
+        twin!(wgsl::PHOTON_STREAM, "Params", photon_stream::gpu::Params {
+            path_count, hop_count, first_path, pool_count, row, share,
+        }),
+        twin!(wgsl::PHOTON_STREAM, "Impact", photon_pool::gpu::Impact { light, red, green, blue }),
+        twin!(wgsl::PHOTON_STREAM, "SurfaceLight", surface_lights::gpu::SurfaceLight { position, area, normal, pad }),
+        twin!(wgsl::PHOTON_STREAM, "SurfaceLightGrid", surface_lights::gpu::SurfaceLightGrid {
+            origin, cell, cells, count, steps, _pad,
+        }),
+        twin!(wgsl::SURFACE_LIGHT_LOOP, "Params", surface_light_shading::gpu::Params {
+            factor, light_count, flux_of_step, are_discs, least, ray_count, first_row, row_count, shadows, reach, sample_offset,
+        }),
         twin!(wgsl::TRACE_STATISTICS, "Params", trace_statistics::gpu::Params { photon_count }),
         twin!(wgsl::TRACE_STATISTICS, "Sums", trace_statistics::gpu::Sums { stored, tentative, absorbed, escaped, lost }),
     ]
@@ -489,6 +501,12 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "SpecularPaths" => vec![&specular_paths::ADVANCE_SLOTS],
         "GlossyLight" => vec![&glossy_light::SLOTS],
         "EnvMapLighting" => vec![&env_map_lighting::SLOTS],
+        "PhotonStream" => vec![&photon_stream::STREAM_SLOTS],
+        "PhotonStream at impacts" => vec![&photon_stream::IMPACT_SLOTS],
+        "SurfaceLightShading loop" | "SurfaceLightShading tiles" => vec![&surface_light_shading::SHADE_SLOTS],
+        "SurfaceLightShading draw" => vec![&surface_light_shading::DRAW_SLOTS],
+        "SurfaceLightShading spread" => vec![&surface_light_shading::rays::SPREAD_SLOTS],
+        "SurfaceLightShading sum" => vec![&surface_light_shading::rays::SUM_SLOTS],
         "FinalGather spread" => vec![&final_gather::SPREAD_SLOTS],
         "FinalGather sum" => vec![&final_gather::SUM_SLOTS],
         "IrradianceFilter" => vec![&irradiance_filter::SLOTS],
@@ -852,6 +870,19 @@ fn ways_to_gather_penumbrae_have_the_same_numbers_on_both_sides() {
         ("GATHERED_LATER", Gathered::Later),
     ] {
         assert_eq!(shader.constant(name), Literal::U32(gathered as u32), "{name}");
+    }
+}
+
+#[test]
+fn indirect_shadows_have_the_same_numbers_on_both_sides() {
+    use crate::pass::IndirectShadows;
+    let shader = Shader::new("SurfaceLightShading sum", wgsl::SURFACE_LIGHT_SUM);
+    for (name, shadows) in [
+        ("SHADOWS_AMBIENT", IndirectShadows::AmbientOcclusion),
+        ("SHADOWS_SOME", IndirectShadows::Some),
+        ("SHADOWS_ALL", IndirectShadows::All),
+    ] {
+        assert_eq!(shader.constant(name), Literal::U32(shadows as u32), "{name}");
     }
 }
 

@@ -393,6 +393,97 @@ pub(crate) const ENV_MAP_LIGHTING: &str = compose![
     "common/hash.wgsl",
 ];
 
+pub(crate) const PHOTON_STREAM: &str = compose![
+    "pass/photon_stream/stream_impacts.wgsl",
+    "pass/photon_stream/nearest_light.wgsl",
+    "pass/photon_stream/params.wgsl",
+    "common/surface_light.wgsl",
+    "common/photon.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/hash.wgsl",
+];
+
+pub(crate) const PHOTON_STREAM_AT_IMPACTS: &str = compose![
+    "pass/photon_stream/lights_at_impacts.wgsl",
+    "pass/photon_stream/params.wgsl",
+    "common/surface_light.wgsl",
+    "common/photon.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/hash.wgsl",
+];
+
+pub(crate) const SURFACE_LIGHT_LOOP: &str = compose![
+    "pass/surface_light_shading/loop_lights.wgsl",
+    "pass/surface_light_shading/shade_bindings.wgsl",
+    "pass/surface_light_shading/params.wgsl",
+    "common/surface_light.wgsl",
+    "common/receiver_at.wgsl",
+    "common/receiver.wgsl",
+    "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
+    "common/octahedral.wgsl",
+];
+
+pub(crate) const SURFACE_LIGHT_TILES: &str = compose![
+    "pass/surface_light_shading/tile_lights.wgsl",
+    "pass/surface_light_shading/shade_bindings.wgsl",
+    "pass/surface_light_shading/params.wgsl",
+    "common/surface_light.wgsl",
+    "common/receiver_at.wgsl",
+    "common/receiver.wgsl",
+    "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
+    "common/octahedral.wgsl",
+];
+
+pub(crate) const SURFACE_LIGHT_DRAW: &str = compose![
+    "pass/surface_light_shading/draw_lights.wgsl",
+    "pass/surface_light_shading/params.wgsl",
+    "common/surface_light.wgsl",
+    "common/receiver_at.wgsl",
+    "common/receiver.wgsl",
+    "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
+    "common/octahedral.wgsl",
+];
+
+pub(crate) const SURFACE_LIGHT_SPREAD: &str = compose![
+    "pass/surface_light_shading/spread_rays.wgsl",
+    "pass/surface_light_shading/shadow_rays.wgsl",
+    "pass/surface_light_shading/params.wgsl",
+    "common/surface_light.wgsl",
+    "common/surface_rays.wgsl",
+    "common/sampling.wgsl",
+    "common/random.wgsl",
+    "common/halton.wgsl",
+    "common/hash.wgsl",
+    "common/receiver_at.wgsl",
+    "common/receiver.wgsl",
+    "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
+    "common/octahedral.wgsl",
+];
+
+pub(crate) const SURFACE_LIGHT_SUM: &str = compose![
+    "pass/surface_light_shading/sum_rays.wgsl",
+    "pass/surface_light_shading/shadow_rays.wgsl",
+    "pass/surface_light_shading/params.wgsl",
+    "common/surface_light.wgsl",
+    "common/surface_rays.wgsl",
+    "common/hit.wgsl",
+    "common/sampling.wgsl",
+    "common/random.wgsl",
+    "common/halton.wgsl",
+    "common/hash.wgsl",
+    "common/receiver_at.wgsl",
+    "common/receiver.wgsl",
+    "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
+    "common/octahedral.wgsl",
+];
+
 pub(crate) const FINAL_GATHER_SPREAD: &str = compose![
     "pass/final_gather/spread_rays.wgsl",
     "pass/final_gather/params.wgsl",
@@ -874,6 +965,13 @@ pub const MODULES: &[(&str, &str)] = &[
     ("SpecularPaths", SPECULAR_PATHS_ADVANCE),
     ("GlossyLight", GLOSSY_LIGHT),
     ("EnvMapLighting", ENV_MAP_LIGHTING),
+    ("PhotonStream", PHOTON_STREAM),
+    ("PhotonStream at impacts", PHOTON_STREAM_AT_IMPACTS),
+    ("SurfaceLightShading loop", SURFACE_LIGHT_LOOP),
+    ("SurfaceLightShading tiles", SURFACE_LIGHT_TILES),
+    ("SurfaceLightShading draw", SURFACE_LIGHT_DRAW),
+    ("SurfaceLightShading spread", SURFACE_LIGHT_SPREAD),
+    ("SurfaceLightShading sum", SURFACE_LIGHT_SUM),
     ("FinalGather spread", FINAL_GATHER_SPREAD),
     ("FinalGather sum", FINAL_GATHER_SUM),
     ("IrradianceFilter", IRRADIANCE_FILTER),

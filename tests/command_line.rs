@@ -93,7 +93,10 @@ fn bad_input_gets_one_line_status_two_and_no_file() {
             &["sample:cornell", "--set", "tracer.kind=none"],
             "image-space, bvh or hybrid",
         ),
-        (&["sample:cornell", "--method", "surface-lights"], "not available yet"),
+        (
+            &["sample:cornell", "--method", "illumination-maps"],
+            "not available yet",
+        ),
         (
             &["sample:cornell", "--method", "illumination-maps"],
             "not available yet",
@@ -205,7 +208,7 @@ fn images_and_statistics_are_written_whole() {
         .map(|v| v.as_u64().unwrap())
         .sum();
     assert_eq!(bytes["total"].as_u64().unwrap(), sum);
-    assert_eq!(stats["plan"].as_array().unwrap().len(), 23);
+    assert_eq!(stats["plan"].as_array().unwrap().len(), 25);
     // Of a scene in motion, with a lamp that casts penumbrae.
     render_to_penumbra(&path("p.json"));
     let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(path("p.json")).unwrap()).unwrap();

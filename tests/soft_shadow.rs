@@ -838,7 +838,7 @@ fn the_renderer_gathers_soft_shadows_only_where_a_light_has_an_extent() {
     assert!(soft != hard.0);
     let plan = offline.renderer.plan().unwrap().to_string();
     assert!(
-        plan.contains("SoftShadow        on   1 light(s) with an extent"),
+        plan.contains("SoftShadow          on   1 light(s) with an extent"),
         "{plan}"
     );
     // What eyes see is the irradiance of the point times the layer.

@@ -1,13 +1,13 @@
 //! Renders a scene without a window: one device, one view, any number of frames accumulated.
 
 use super::adapter::Gpu;
-use lightfall::frame::{GiRenderer, SceneInputs, Settings, ViewInputs, ViewResources};
+use lightfall::frame::{GiRenderer, IndirectMethod, SceneInputs, Settings, ViewInputs, ViewResources};
 use lightfall::pass::{
     Accumulator, AccumulatorInputs, AccumulatorResources, CompositeSettings, HopStatistics, TraceStatistics,
     TraceStatisticsInputs, TraceStatisticsResources,
 };
 use lightfall::resource::{BvhGeometry, BvhGeometryConfig, CameraView, Geometry, MarkedPixels, MeshGeometry, Radiance};
-use lightfall::scene::{Scene, SceneSummary};
+use lightfall::scene::{Scene, SceneSummary, SurfacePoint};
 use lightfall::{Error, Timestamps, wgpu};
 
 /// Which part of the light to keep.
@@ -38,6 +38,8 @@ pub(crate) struct Offline<'a> {
     accumulator: Option<(Accumulator, AccumulatorResources)>,
     /// Whether every frame is taken for one of a scene that changes; not while frames are accumulated.
     pub(crate) in_motion: bool,
+    /// Where surface lights stand, if there are any.
+    points: Vec<SurfacePoint>,
     scene: Scene,
     summary: SceneSummary,
     camera: usize,
@@ -64,6 +66,11 @@ impl<'a> Offline<'a> {
         renderer.set_environment(queue, scene.environment_image())?;
         renderer.set_scene(queue, &summary, &scene.lights)?;
         renderer.place_env_maps_blocking(queue, &mut geometry)?;
+        let takes_points = settings.indirect_method == IndirectMethod::SurfaceLights;
+        let count = settings.surface_lights.places as usize;
+        let points = takes_points
+            .then(|| SurfacePoint::place(&scene, count))
+            .unwrap_or_default();
         let weight = |on: bool| if on { 1.0 } else { 0.0 };
         let is_one_of =
             |components: &[Component]| weight(component == Component::All || components.contains(&component));
@@ -87,6 +94,7 @@ impl<'a> Offline<'a> {
             geometry,
             bvh,
             in_motion: accumulator.is_none(),
+            points,
             accumulator,
             scene,
             summary,
@@ -106,6 +114,9 @@ impl<'a> Offline<'a> {
     /// Renders the next frame and waits for it.
     pub(crate) fn render_frame(&mut self, timestamps: Option<&Timestamps>) -> Result<(), Error> {
         let (device, queue) = (&self.gpu.device, &self.gpu.queue);
+        let place = |p: &SurfacePoint| p.in_world(&self.scene.instances[p.instance].transform);
+        let places: Vec<_> = self.points.iter().map(place).collect();
+        self.renderer.set_surface_places(&places);
         let frame = self.renderer.set_scene(queue, &self.summary, &self.scene.lights)?;
         if self.in_motion {
             self.renderer.geometry_changed();
@@ -134,6 +145,9 @@ impl<'a> Offline<'a> {
             sample_offset,
             timestamps,
         };
+        if self.renderer.photon_pool().is_some_and(|pool| pool.share() < 1.0) {
+            self.renderer.fill_photon_pool(&scene_inputs)?;
+        }
         self.renderer.record_scene(&mut encoder, &scene_inputs)?;
         let view_inputs = ViewInputs {
             queue,

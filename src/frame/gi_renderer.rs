@@ -16,7 +16,8 @@ use super::recapture::Recapture;
 use super::selection_schedule::{PHOTON_ROUNDS, Work};
 use super::specular_view::SpecularView;
 use super::stand_ins::StandIns;
-use super::{IndirectMethod, Plan, Settings, Stage};
+use super::surface_light_scene::SurfaceLightScene;
+use super::{IndirectMethod, LightPlacement, Plan, Settings, Stage};
 use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, CoverageMeasure, EnvMapSelector,
     FusedCompositeInputs, GBufferCapture, GBufferCaptureInputs, PathShape, PhotonSplatter, PhotonSplatterResources,
@@ -25,10 +26,12 @@ use crate::pass::{
 use crate::resource::BvhGeometry;
 use crate::resource::{
     CameraView, CapturePurpose, CaptureView, DepthHierarchy, EnvMapIrradiance, EnvMaps, Environment, GBuffer, Geometry,
-    GuidingTables, Irradiance, MarkedPixels, Photons, PrepareContext, Radiance, ShadowMaps, Subsampling, Visibility,
+    GuidingTables, Irradiance, MarkedPixels, PhotonPool, Photons, PrepareContext, Radiance, ShadowMaps, Subsampling,
+    SurfaceLights, Visibility,
 };
 use crate::scene::{
-    Camera, EnvironmentImage, Lamp, Light, LightKind, LightSources, Projection, SceneBounds, SceneSummary, UnitFrame,
+    Camera, EnvironmentImage, Lamp, Light, LightKind, LightSources, Projection, SceneBounds, SceneSummary,
+    SurfacePlace, UnitFrame,
 };
 use crate::{Error, Timestamps};
 use glam::DVec3;
@@ -49,6 +52,8 @@ pub struct GiRenderer {
     state: Option<SceneState>,
     stand_ins: StandIns,
     placement: EnvMapPlacement,
+    /// World space, as the host last gave them.
+    surface_places: Vec<SurfacePlace>,
     /// Changes whenever a resource that views bind is made anew; no two renderers share one.
     generation: u64,
     /// Counts changes of light and geometry.
@@ -197,6 +202,7 @@ impl GiRenderer {
             state: None,
             stand_ins: StandIns::default(),
             placement: EnvMapPlacement::default(),
+            surface_places: Vec::new(),
             generation: next_generation(),
             revision: 0,
             views: Vec::new(),
@@ -296,7 +302,9 @@ impl GiRenderer {
                     suns: &state.suns,
                     lamps: &state.lamps,
                 };
-                direct.lights.write(queue, &frame, &sources, self.settings.photons)?;
+                direct
+                    .lights
+                    .write(queue, &frame, &sources, self.settings.traced_photons())?;
             }
             if let (Some(direct), Some(indirect)) = (&self.direct, &mut self.indirect) {
                 indirect.aim_caustics(queue, &frame, &direct.lights, &summary.specular_bounds);
@@ -456,6 +464,16 @@ impl GiRenderer {
         self.renew_centers(queue)
     }
 
+    /// Says where surface lights stand: places that were chosen once ([`SurfacePoint::place`](crate::scene::SurfacePoint::place), with
+    /// [`SurfaceLightSettings::places`](super::SurfaceLightSettings::places)), where their instances are now. Once, and whenever an
+    /// instance has moved. Of as many places as before each is taken for the same one, and keeps its light.
+    pub fn set_surface_places(&mut self, places: &[SurfacePlace]) {
+        if self.surface_places != places {
+            self.surface_places = places.to_vec();
+            self.revision += 1;
+        }
+    }
+
     /// Says that geometry has moved, appeared or gone since the last frame: the selection of places for environment maps
     /// is then kept up to date until it comes to rest. Call it before `prepare`; a change of the region is noticed without
     /// it.
@@ -534,14 +552,60 @@ impl GiRenderer {
     /// Records what all views share: shadow maps, environment maps, photons.
     ///
     /// # Errors
-    /// [`Error::MissingInput`] if [`Stage::BvhTracer`] is on and no triangles are given. Nothing is recorded then.
+    /// [`Error::MissingInput`] if [`Stage::BvhTracer`] is on and no triangles are given, or surface lights have no places;
+    /// [`Error::InvalidScene`] for a place that is not finite. Nothing is recorded then.
     pub fn record_scene(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) -> Result<(), Error> {
         #[cfg(feature = "bvh")]
         self.check_triangles(inputs)?;
+        self.follow_places(inputs.queue)?;
         self.sample_offset = inputs.sample_offset;
         self.record_shadow_maps(encoder, inputs);
         self.record_selection(encoder, inputs);
         self.record_photons(encoder, inputs)
+    }
+
+    /// Traces all of the photons that surface lights are made of, at once instead of over many frames: at the start, after a cut.
+    /// Submits what it records and does not wait; call it after `prepare`, before `record_scene`. Nothing where there is no
+    /// pool.
+    ///
+    /// # Errors
+    /// As [`GiRenderer::record_scene`].
+    pub fn fill_photon_pool(&mut self, inputs: &SceneInputs<'_>) -> Result<(), Error> {
+        #[cfg(feature = "bvh")]
+        self.check_triangles(inputs)?;
+        self.follow_places(inputs.queue)?;
+        let per_round = self.settings.traced_photons().max(1);
+        let rounds = self.photon_pool().map_or(0, PhotonPool::paths).div_ceil(per_round);
+        // As after a change: photons that rest are traced as well.
+        self.revision += 1;
+        for round in 0..rounds {
+            let mut encoder = self.device.create_command_encoder(&Default::default());
+            if round == 0 {
+                self.record_shadow_maps(&mut encoder, inputs);
+            }
+            self.record_photons(&mut encoder, inputs)?;
+            inputs.queue.submit([encoder.finish()]);
+            // What environment maps show is captured by now.
+            self.env_map_layers.clear();
+            self.env_map_views.end = self.env_map_views.start;
+        }
+        Ok(())
+    }
+
+    /// Puts surface lights where they stand this frame.
+    fn follow_places(&mut self, queue: &wgpu::Queue) -> Result<(), Error> {
+        let lights = self.indirect.as_mut().and_then(IndirectScene::surface_lights_mut);
+        let (Some(lights), Some(state)) = (lights, &self.state) else {
+            return Ok(());
+        };
+        if self.surface_places.is_empty() && self.settings.surface_lights.placement == LightPlacement::OnSurfaces {
+            return Err(Error::MissingInput {
+                stage: "SurfaceLightShading",
+                input: "places for surface lights",
+                remedy: "hand them to GiRenderer::set_surface_places, or choose surface_lights.placement = at-impacts",
+            });
+        }
+        lights.follow((&self.device, queue), &state.frame, &self.surface_places)
     }
 
     fn record_photons(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) -> Result<(), Error> {
@@ -554,6 +618,7 @@ impl GiRenderer {
                 views: &self.views[self.env_map_views.clone()],
                 layers: &self.env_map_layers,
                 updates_guiding: self.guiding.take_update(),
+                revision: self.revision,
                 area: self.state.as_ref().map_or(1.0, |s| s.area),
                 radius: self.state.as_ref().map_or(1.0, |s| s.frame.radius()),
             };
@@ -784,10 +849,12 @@ impl GiRenderer {
         };
         match &self.indirect {
             None => view.indirect = None,
-            Some(scene) if view.indirect.is_none() => {
-                view.indirect = Some(IndirectView::new(device, &self.settings, scene.photons(), size)?);
+            Some(scene) => {
+                let new = || IndirectView::new(device, &self.settings, scene.photons(), size);
+                let mut own = view.indirect.take().map_or_else(new, Ok)?;
+                own.follow(device, &self.settings, scene)?;
+                view.indirect = Some(own);
             }
-            Some(_) => {}
         }
         match self.indirect.as_ref().and_then(IndirectScene::caustic_photons) {
             None => view.caustic = None,
@@ -863,6 +930,16 @@ impl GiRenderer {
     /// Shadow maps, while anything shines.
     pub fn shadow_maps(&self) -> Option<&ShadowMaps> {
         self.direct.as_ref().map(|d| &d.shadow_maps)
+    }
+
+    /// Surface lights, while indirect light comes from them.
+    pub fn surface_lights(&self) -> Option<&SurfaceLights> {
+        self.indirect.as_ref()?.surface_lights().map(SurfaceLightScene::lights)
+    }
+
+    /// The photons that they are made of, unless they stand at impacts.
+    pub fn photon_pool(&self) -> Option<&PhotonPool> {
+        self.indirect.as_ref()?.surface_lights()?.pool()
     }
 
     /// Where photons go, while [`Settings::guided_photons`] is above 0 and there is indirect light.

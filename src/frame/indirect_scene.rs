@@ -1,5 +1,6 @@
 //! What all views share of indirect light: photons, and what the settings let them meet.
 
+use super::surface_light_scene::SurfaceLightScene;
 use super::traced_photons::{TracedPhotons, WalkInputs};
 use super::{GlossyMethod, IndirectMethod, SceneInputs, Settings, TracerKind};
 use crate::Error;
@@ -9,7 +10,8 @@ use crate::pass::{
     Bandwidth, DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EnvMapCapture,
     EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources,
     EnvMapLightingSettings, FirstHits, Guiding, GuidingUpdateInputs, GuidingUpdateResources, ImageSpaceTracer,
-    PhotonEmitter, PhotonGrid, PhotonGridInputs, PhotonGridResources, PhotonGuiding, PhotonSpread, SortedPhotons,
+    PhotonEmitter, PhotonGrid, PhotonGridInputs, PhotonGridResources, PhotonGuiding, PhotonSpread, PhotonStream,
+    SortedPhotons,
 };
 use crate::resource::{
     CaptureView, DepthHierarchy, EnvMapIrradiance, EnvMaps, GuidingTables, Lights, PhotonMap, PhotonTargets, Photons,
@@ -32,6 +34,8 @@ pub(super) struct PhotonPasses {
     pub(super) bvh_tracer: Option<BvhTracer>,
     /// If light is gathered from there.
     env_map_lighting: Option<EnvMapLighting>,
+    /// If light comes from surface lights.
+    pub(super) photon_stream: Option<PhotonStream>,
     photon_grid: PhotonGrid,
     /// If the settings light rough metal by photons.
     glossy_grid: Option<PhotonGrid>,
@@ -44,6 +48,8 @@ pub(super) struct IndirectScene {
     /// If photons are guided.
     guiding: Option<(GuidingTables, GuidingUpdateResources)>,
     image_space: Option<ImageSpaceScene>,
+    /// If light comes from there.
+    surface_lights: Option<SurfaceLightScene>,
     /// While caustics have photons of their own, and what these are aimed at.
     caustics: Option<(TracedPhotons, PhotonTargets)>,
     /// While anything specular may be seen.
@@ -76,6 +82,8 @@ pub(super) struct PhotonInputs<'a> {
     pub(super) layers: &'a [u32],
     /// Whether it is time to look where photons are seen.
     pub(super) updates_guiding: bool,
+    /// Of lights and geometry.
+    pub(super) revision: u64,
     /// Of all surfaces, unit frame.
     pub(super) area: f32,
     /// Of the region, unit frame.
@@ -98,6 +106,8 @@ impl PhotonPasses {
                 let config = &settings.splatter_config;
                 EnvMapLighting::new(device, config.kernel, config.keeps_to_surfaces)
             }),
+            photon_stream: (settings.indirect_method == IndirectMethod::SurfaceLights)
+                .then(|| PhotonStream::new(device)),
             photon_grid: grid(SortedPhotons::OnDiffuse),
             glossy_grid: (settings.glossy_method == GlossyMethod::Photons).then(|| grid(SortedPhotons::OnGlossy)),
         }
@@ -108,8 +118,7 @@ impl IndirectScene {
     pub(super) fn new(device: &wgpu::Device, queue: &wgpu::Queue, settings: &Settings) -> Result<Self, Error> {
         let global = TracedPhotons::new(
             device,
-            settings,
-            settings.photons,
+            (settings.traced_photons(), settings.walked_bounces()),
             (PhotonMap::All, settings.tracer_kind),
         )?;
         let image_space = || {
@@ -145,6 +154,9 @@ impl IndirectScene {
         Ok(Self {
             guiding: (settings.guided_photons > 0.0).then(guiding).transpose()?,
             image_space: settings.needs_env_maps().then(image_space).transpose()?,
+            surface_lights: (settings.indirect_method == IndirectMethod::SurfaceLights)
+                .then(|| SurfaceLightScene::new(device, settings))
+                .transpose()?,
             caustics: None,
             grid: None,
             glossy_grid: None,
@@ -171,7 +183,11 @@ impl IndirectScene {
             self.caustics = None;
         } else if self.caustics.is_none() {
             let kind = settings.caustic_tracer();
-            let traced = TracedPhotons::new(device, settings, settings.caustic.photons, (PhotonMap::Caustic, kind))?;
+            let traced = TracedPhotons::new(
+                device,
+                (settings.caustic.photons, settings.bounces),
+                (PhotonMap::Caustic, kind),
+            )?;
             self.caustics = Some((traced, PhotonTargets::new(device)?));
         }
         let is_split = self.caustics.is_some();
@@ -211,6 +227,14 @@ impl IndirectScene {
     /// All but caustics, where these have photons of their own.
     pub(super) fn photons(&self) -> &Photons {
         &self.global.photons
+    }
+
+    pub(super) fn surface_lights(&self) -> Option<&SurfaceLightScene> {
+        self.surface_lights.as_ref()
+    }
+
+    pub(super) fn surface_lights_mut(&mut self) -> Option<&mut SurfaceLightScene> {
+        self.surface_lights.as_mut()
     }
 
     pub(super) fn caustic_photons(&self) -> Option<&Photons> {
@@ -301,7 +325,10 @@ impl IndirectScene {
             maps: env_maps.map(|i| (&i.env_maps, i.hierarchy.as_ref().map(|h| &h.0))),
             sample_offset: scene.sample_offset,
         };
-        self.global.record(encoder, passes, &walk_inputs)?;
+        match &mut self.surface_lights {
+            None => self.global.record(encoder, passes, &walk_inputs)?,
+            Some(lights) => lights.record(encoder, passes, &mut self.global, walk_inputs)?,
+        }
         if let Some((caustics, targets)) = &mut self.caustics {
             walk_inputs.spread = PhotonSpread::Targets(targets);
             walk_inputs.first_hits = match inputs.settings.caustic_tracer() {
@@ -381,6 +408,9 @@ impl IndirectScene {
             if let Some((irradiance, own)) = &image_space.lighting {
                 list.push(("env_map_lighting", irradiance.memory_use() + own.memory_use()));
             }
+        }
+        if let Some(lights) = &self.surface_lights {
+            list.push(("surface_lights", lights.memory_use()));
         }
         if let Some((traced, targets)) = &self.caustics {
             let own = traced.memory_use();

@@ -1,6 +1,7 @@
 //! What a view has of indirect light: the estimate at a part of its pixels, and the levels from there to all of them.
 
 use super::indirect_scene::{IndirectScene, PhotonPasses};
+use super::surface_light_view::SurfaceLightView;
 use super::{GlossyMethod, IndirectMethod, Settings, Upsampling, ViewInputs};
 use crate::Error;
 #[cfg(feature = "bvh")]
@@ -9,8 +10,8 @@ use crate::pass::{
     FinalGather, FinalGatherInputs, FinalGatherResources, GlossyLight, ImageSpaceTracerRayInputs,
     ImageSpaceTracerResources, IrradianceFilter, IrradianceFilterInputs, IrradianceFilterResources,
     IrradianceFilterSettings, MarkedSplatInputs, PhotonGuidingInputs, PhotonGuidingResources, PhotonSplatter,
-    PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings, SpecularPaths, SplatShape, Upsampler,
-    UpsamplerInputs, UpsamplerResources, progressive_scale,
+    PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings, SpecularPaths, SplatShape,
+    SurfaceLightShading, Upsampler, UpsamplerInputs, UpsamplerResources, progressive_scale,
 };
 use crate::resource::{GBuffer, Irradiance, Lights, MarkedPixels, Photons, Subsampling, SurfaceRays};
 
@@ -23,6 +24,8 @@ pub(super) struct ViewPasses {
     pub(super) photon_splatter: PhotonSplatter,
     /// If they gather.
     final_gather: Option<(FinalGather, IrradianceFilter)>,
+    /// If the settings take surface lights.
+    pub(super) surface_light_shading: Option<SurfaceLightShading>,
     upsampler: Upsampler,
     pub(super) specular_paths: SpecularPaths,
     /// If the settings light rough metal by photons.
@@ -46,6 +49,7 @@ pub(super) struct IndirectView {
 enum Estimate {
     Splatting(Box<PhotonSplatterResources>),
     FinalGather(Box<GatherView>),
+    SurfaceLights(Box<SurfaceLightView>),
 }
 
 #[derive(Debug)]
@@ -103,6 +107,8 @@ impl ViewPasses {
         Ok(Self {
             photon_splatter: PhotonSplatter::new(device, &settings.splatter_config)?,
             final_gather: gathers.then(|| (FinalGather::new(device), IrradianceFilter::new(device))),
+            surface_light_shading: (settings.indirect_method == IndirectMethod::SurfaceLights)
+                .then(|| SurfaceLightShading::new(device)),
             upsampler: Upsampler::new(device),
             specular_paths: SpecularPaths::new(
                 device,
@@ -125,14 +131,21 @@ impl IndirectView {
         let config = &settings.splatter_config;
         let estimated = settings.subsampling.size(size);
         let splats = settings.indirect_method == IndirectMethod::Splatting;
-        let estimate = if splats {
-            Estimate::Splatting(Box::new(PhotonSplatterResources::new(
-                device, config, photons, estimated,
-            )?))
-        } else {
-            Estimate::FinalGather(Box::new(GatherView::new(device, settings, estimated)?))
+        let mut format = wgpu::TextureFormat::Rgba32Float;
+        let estimate = match settings.indirect_method {
+            IndirectMethod::Splatting => {
+                let own = PhotonSplatterResources::new(device, config, photons, estimated)?;
+                Estimate::Splatting(Box::new(own))
+            }
+            IndirectMethod::FinalGather => {
+                Estimate::FinalGather(Box::new(GatherView::new(device, settings, estimated)?))
+            }
+            IndirectMethod::SurfaceLights => {
+                format = SurfaceLightView::format(device, settings);
+                Estimate::SurfaceLights(Box::new(SurfaceLightView::new(device)?))
+            }
         };
-        let estimated = Irradiance::new(device, estimated, wgpu::TextureFormat::Rgba32Float)?;
+        let estimated = Irradiance::new(device, estimated, format)?;
         let by_levels = settings.upsampling == Upsampling::ByLevels;
         let mut levels = Vec::new();
         let mut finer = settings.subsampling.finer();
@@ -162,6 +175,19 @@ impl IndirectView {
         self.levels.last().map_or(estimated, |l| (&l.irradiance, l.subsampling))
     }
 
+    /// Makes or drops what depends on the scene's surface lights.
+    pub(super) fn follow(
+        &mut self,
+        device: &wgpu::Device,
+        settings: &Settings,
+        scene: &IndirectScene,
+    ) -> Result<(), Error> {
+        if let (Estimate::SurfaceLights(own), Some(lights)) = (&mut self.estimate, scene.surface_lights()) {
+            own.follow(device, settings, lights.lights(), self.estimated.size())?;
+        }
+        Ok(())
+    }
+
     /// At all pixels, unless the step to them is left to the sum.
     pub(super) fn irradiance(&self) -> Option<&Irradiance> {
         let (irradiance, subsampling) = self.samples();
@@ -182,6 +208,7 @@ impl IndirectView {
         match &mut self.estimate {
             Estimate::Splatting(own) => splat(encoder, own, &self.estimated, inputs),
             Estimate::FinalGather(own) => own.record(encoder, &self.estimated, inputs)?,
+            Estimate::SurfaceLights(own) => own.record(encoder, &self.estimated, inputs)?,
         }
         self.upsample(encoder, inputs);
         self.count_guiding(encoder, inputs);
@@ -247,6 +274,7 @@ impl IndirectView {
         list.push(match &self.estimate {
             Estimate::Splatting(own) => ("splatter", own.memory_use()),
             Estimate::FinalGather(own) => ("final_gather", own.memory_use()),
+            Estimate::SurfaceLights(own) => ("surface_light_shading", own.memory_use()),
         });
         if let Some(guiding) = &self.guiding {
             list.push(("photon_guiding", guiding.memory_use()));

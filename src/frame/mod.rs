@@ -15,10 +15,13 @@ mod selection_schedule;
 mod settings;
 mod specular_view;
 mod stand_ins;
+mod surface_light_scene;
+mod surface_light_view;
 mod traced_photons;
 
 pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};
 pub use plan::{Plan, PlannedStage, Stage};
 pub use settings::{
-    CausticSettings, FinalGatherSettings, GlossyMethod, IndirectMethod, Settings, TracerKind, Upsampling,
+    CausticSettings, FinalGatherSettings, GlossyMethod, IndirectMethod, LightPlacement, Settings, SurfaceLightSettings,
+    TracerKind, Upsampling,
 };

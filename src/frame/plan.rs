@@ -1,7 +1,7 @@
 //! Model only what the scene requires: which stages run, and why.
 
-use super::{GlossyMethod, IndirectMethod, Settings, TracerKind, Upsampling};
-use crate::pass::FirstHits;
+use super::{GlossyMethod, IndirectMethod, LightPlacement, Settings, TracerKind, Upsampling};
+use crate::pass::{FirstHits, IndirectShadows};
 use crate::resource::MAX_DIRECT_POLYGONS;
 use crate::scene::SceneSummary;
 use std::fmt;
@@ -35,10 +35,14 @@ pub enum Stage {
     BvhTracer,
     /// Photons by way of metal and glass alone: aimed, traced and splatted by themselves.
     CausticMap,
+    /// Photons to surface lights.
+    PhotonStream,
     /// Light on what environment maps show.
     EnvMapLighting,
     /// Photons to irradiance.
     PhotonSplatter,
+    /// Surface lights to irradiance.
+    SurfaceLightShading,
     /// What rays bring back from lit environment maps.
     FinalGather,
     /// Noise evened out along surfaces.
@@ -134,7 +138,7 @@ impl Plan {
         let [image_space, bvh] = tracers(&indirect, settings);
         let upsampling = upsampling(&indirect, settings);
         let [direct, fused, sum] = sums(&lit, settings);
-        let [splatting, gathering, filtering] = estimates(&indirect, settings);
+        let estimates = estimates(&indirect, settings);
         Self {
             stages: vec![
                 stage(Stage::GBufferCapture, always("every view")),
@@ -150,10 +154,12 @@ impl Plan {
                 stage(Stage::ImageSpaceTracer, image_space),
                 stage(Stage::BvhTracer, bvh),
                 stage(Stage::CausticMap, caustics),
-                stage(Stage::EnvMapLighting, gathering.clone()),
-                stage(Stage::PhotonSplatter, splatting),
-                stage(Stage::FinalGather, gathering.clone()),
-                stage(Stage::IrradianceFilter, filtering),
+                stage(Stage::PhotonStream, estimates.streaming),
+                stage(Stage::EnvMapLighting, estimates.gathering.clone()),
+                stage(Stage::PhotonSplatter, estimates.splatting),
+                stage(Stage::SurfaceLightShading, estimates.shading),
+                stage(Stage::FinalGather, estimates.gathering),
+                stage(Stage::IrradianceFilter, estimates.filtering),
                 stage(Stage::Upsampler, upsampling),
                 stage(Stage::PhotonGrid, specular.clone()),
                 stage(Stage::SpecularPaths, specular),
@@ -217,7 +223,7 @@ fn indirect(summary: &SceneSummary, settings: &Settings) -> (bool, String) {
     } else if settings.photons == 0 {
         off("settings allow no photons")
     } else {
-        let reason = format!("{} photons, {} bounce(s)", settings.photons, settings.bounces);
+        let reason = format!("{} photons, {} bounce(s)", settings.traced_photons(), settings.bounces);
         (true, reason)
     }
 }
@@ -255,27 +261,69 @@ fn guiding(indirect: &(bool, String), settings: &Settings) -> (bool, String) {
     }
 }
 
-/// From photons to pixels: the photons around, or rays to lit environment maps, and a filter of their noise.
-fn estimates(indirect: &(bool, String), settings: &Settings) -> [(bool, String); 3] {
+/// From photons to pixels: the photons around, rays to lit environment maps and a filter of their noise, or surface lights
+/// made of a stream of photons.
+struct Estimates {
+    splatting: (bool, String),
+    gathering: (bool, String),
+    filtering: (bool, String),
+    streaming: (bool, String),
+    shading: (bool, String),
+}
+
+fn estimates(indirect: &(bool, String), settings: &Settings) -> Estimates {
+    let off = |reason: &str| {
+        (
+            false,
+            if indirect.0 {
+                reason.to_owned()
+            } else {
+                indirect.1.clone()
+            },
+        )
+    };
+    let (gathers, lights) = (&settings.final_gather, &settings.surface_lights);
+    let mut all = Estimates {
+        splatting: off(match settings.indirect_method {
+            IndirectMethod::FinalGather => "settings gather from lit environment maps",
+            _ => "settings take surface lights",
+        }),
+        gathering: off(match settings.indirect_method {
+            IndirectMethod::Splatting => "settings take the photons around",
+            _ => "settings take surface lights",
+        }),
+        filtering: off("no noise of rays"),
+        streaming: off("settings take no surface lights"),
+        shading: off("settings take no surface lights"),
+    };
     if !indirect.0 {
-        return [(); 3].map(|()| indirect.clone());
+        return all;
     }
-    let [splatting, gathering] = match settings.indirect_method {
-        IndirectMethod::Splatting => [indirect.clone(), (false, "settings take the photons around".to_owned())],
+    match settings.indirect_method {
+        IndirectMethod::Splatting => all.splatting = indirect.clone(),
         IndirectMethod::FinalGather => {
-            let rays = format!("{} rays a pixel", settings.final_gather.rays);
-            [
-                (false, "settings gather from lit environment maps".to_owned()),
-                (true, rays),
-            ]
+            all.gathering = (true, format!("{} rays a pixel", gathers.rays));
+            all.filtering = match gathers.filter_radius {
+                0 => (false, "settings leave the noise of rays".to_owned()),
+                radius => (true, format!("noise of rays over {radius} pixel(s) to each side")),
+            };
         }
-    };
-    let filtering = match settings.final_gather.filter_radius {
-        _ if !gathering.0 => gathering.clone(),
-        0 => (false, "settings leave the noise of rays".to_owned()),
-        radius => (true, format!("noise of rays over {radius} pixel(s) to each side")),
-    };
-    [splatting, gathering, filtering]
+        IndirectMethod::SurfaceLights => {
+            let pool = match lights.placement {
+                LightPlacement::OnSurfaces => format!("a pool of {} paths", settings.pool_paths()),
+                LightPlacement::AtImpacts => "a light at each impact".to_owned(),
+            };
+            let shadows = match lights.shading.shadows {
+                IndirectShadows::Off => "without shadows".to_owned(),
+                IndirectShadows::AmbientOcclusion => format!("ambient occlusion by {} rays", lights.shading.rays),
+                IndirectShadows::Some => format!("shadows by {} rays", lights.shading.rays),
+                IndirectShadows::All => "shadows by a ray to each".to_owned(),
+            };
+            all.streaming = (true, pool);
+            all.shading = (true, format!("{} places, {shadows}", lights.places));
+        }
+    }
+    all
 }
 
 /// The tracer in image space, and that of triangles.
@@ -388,10 +436,10 @@ impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for stage in &self.stages {
             let on = if stage.on { "on" } else { "off" };
-            writeln!(f, "{:<17} {on:<4} {}", stage.stage.name(), stage.reason)?;
+            writeln!(f, "{:<19} {on:<4} {}", stage.stage.name(), stage.reason)?;
         }
         for note in &self.simplifications {
-            writeln!(f, "{:<17} {:<4} {note}", "simplified", "")?;
+            writeln!(f, "{:<19} {:<4} {note}", "simplified", "")?;
         }
         Ok(())
     }

@@ -3,9 +3,9 @@
 use crate::Error;
 use crate::pass::{
     Bandwidth, BoundaryCorrection, CoverageMeasure, EnvMapSelectorResources, EnvMapSelectorSettings, FirstHits,
-    ImageSpaceTracerSettings, Kernel, LARGEST_RADIUS, MAX_POINTS, MAX_SELECTED, MAX_TAPS, MOST_FILTER_RADIUS,
-    OccluderTest, PenumbraSearch, PhotonSplatterConfig, PhotonSplatterSettings, ShadowMethod, SoftShadowSettings,
-    SplatShape, TraceMethod, UpsamplerSettings,
+    ImageSpaceTracerSettings, IndirectShadows, Kernel, LARGEST_RADIUS, LightForm, LightShape, MAX_POINTS, MAX_SELECTED,
+    MAX_TAPS, MOST_FILTER_RADIUS, OccluderTest, PenumbraSearch, PhotonSplatterConfig, PhotonSplatterSettings,
+    ShadowMethod, SoftShadowSettings, SplatShape, SurfaceLightShadingSettings, TraceMethod, UpsamplerSettings,
 };
 use crate::resource::{Lights, MAX_LIGHTS, Subsampling};
 
@@ -52,6 +52,48 @@ pub enum IndirectMethod {
     /// By rays from there, which bring back the light of lit environment maps. No kernel lies over an edge; noise is that of few
     /// rays. It takes environment maps, whatever the tracer; rays meet what photons do. Light has one bounce more.
     FinalGather,
+    /// From virtual surface lights: points on surfaces that stand for the light of a pool of photons around them. No kernel and no
+    /// noise of photons; their number is that of lights. It takes places, [`GiRenderer::set_surface_places`](super::GiRenderer::set_surface_places), or
+    /// stands them where photons arrive.
+    SurfaceLights,
+}
+
+/// Where surface lights stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum LightPlacement {
+    /// At places that were chosen beforehand and move with their instances.
+    #[default]
+    OnSurfaces,
+    /// Where this frame's photons arrive, as points: instant radiosity, the baseline. They jump when anything moves.
+    AtImpacts,
+}
+
+/// Surface lights, and the photons that they are made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceLightSettings {
+    /// Places to choose, 1 to 16384: what a host gives to [`SurfacePoint::place`](crate::scene::SurfacePoint::place). More resolve more, and
+    /// cost in proportion.
+    pub places: u32,
+    /// Paths in the pool, 1 to 16777216, rounded up to a multiple of `stream`. More have less noise, and take longer to follow a change.
+    pub pool: u32,
+    /// Photons traced a frame, 1 or more: as many of the pool are replaced. More follow changes faster, and cost in proportion.
+    pub stream: u32,
+    /// Where they stand.
+    pub placement: LightPlacement,
+    /// How they come to pixels.
+    pub shading: SurfaceLightShadingSettings,
+}
+
+impl Default for SurfaceLightSettings {
+    fn default() -> Self {
+        Self {
+            places: 200,
+            pool: 100_000,
+            stream: 5000,
+            placement: LightPlacement::default(),
+            shading: SurfaceLightShadingSettings::default(),
+        }
+    }
 }
 
 /// Rays that gather, and what they gather from.
@@ -172,6 +214,8 @@ pub struct Settings {
     pub indirect_method: IndirectMethod,
     /// Where it is gathered.
     pub final_gather: FinalGatherSettings,
+    /// Where it comes from surface lights.
+    pub surface_lights: SurfaceLightSettings,
     /// Light by way of metal and glass alone.
     pub caustic: CausticSettings,
     /// Most specular surfaces that the eye looks through or into one behind the other, 1 to 32: a ball of glass has two. What lies
@@ -267,6 +311,7 @@ impl Settings {
             tracer: ImageSpaceTracerSettings::default(),
             indirect_method: IndirectMethod::default(),
             final_gather: FinalGatherSettings::default(),
+            surface_lights: SurfaceLightSettings::default(),
             caustic: CausticSettings::default(),
             specular_surfaces: 6,
             specular_paths: 4,
@@ -360,6 +405,34 @@ impl Settings {
             Some(knob) => Err(knob.error(&(knob.get)(self))),
             None => Ok(()),
         }
+    }
+
+    /// Photons emitted a frame, caustic ones aside.
+    pub(super) fn traced_photons(&self) -> u32 {
+        let own = &self.surface_lights;
+        match (self.indirect_method, own.placement) {
+            (IndirectMethod::SurfaceLights, _) if self.photons == 0 => 0,
+            (IndirectMethod::SurfaceLights, LightPlacement::OnSurfaces) => own.stream,
+            // As many lights as places.
+            (IndirectMethod::SurfaceLights, LightPlacement::AtImpacts) => {
+                own.places.div_ceil(self.walked_bounces() + 1)
+            }
+            _ => self.photons,
+        }
+    }
+
+    /// Surfaces that photons scatter at: of surface lights the last one shines by itself.
+    pub(super) fn walked_bounces(&self) -> u32 {
+        match self.indirect_method {
+            IndirectMethod::SurfaceLights => self.bounces.saturating_sub(1),
+            _ => self.bounces,
+        }
+    }
+
+    /// Paths that the pool holds: whole frames of them.
+    pub(super) fn pool_paths(&self) -> u32 {
+        let own = &self.surface_lights;
+        own.pool.div_ceil(own.stream.max(1)) * own.stream
     }
 
     /// First index into the random sequence of caustic photons, as many frames on as that of all photons is.
@@ -630,10 +703,11 @@ const KNOBS: &[Knob] = &[
     field!("tracer.roulette_from", "1 or more", tracer.roulette_from, |v| v >= 1),
     choice!(
         "indirect.method",
-        "splatting or final-gather",
+        "splatting, final-gather or surface-lights",
         indirect_method,
         ["splatting", IndirectMethod::Splatting],
-        ["final-gather", IndirectMethod::FinalGather]
+        ["final-gather", IndirectMethod::FinalGather],
+        ["surface-lights", IndirectMethod::SurfaceLights]
     ),
     field!("caustic.photons", "0 to 100000000", caustic.photons, |v| v
         <= 100_000_000),
@@ -658,6 +732,61 @@ const KNOBS: &[Knob] = &[
         .contains(&v)),
     field!("final_gather.rays", "1 to 4096", final_gather.rays, |v| (1..=4096)
         .contains(&v)),
+    choice!(
+        "surface_lights.placement",
+        "on-surfaces or at-impacts",
+        surface_lights.placement,
+        ["on-surfaces", LightPlacement::OnSurfaces],
+        ["at-impacts", LightPlacement::AtImpacts]
+    ),
+    field!("surface_lights.places", "1 to 16384", surface_lights.places, |v| (1
+        ..=16384)
+        .contains(&v)),
+    field!("surface_lights.pool", "1 to 16777216", surface_lights.pool, |v| (1..=1
+        << 24)
+        .contains(&v)),
+    field!("surface_lights.stream", "1 to 1000000", surface_lights.stream, |v| (1
+        ..=1_000_000)
+        .contains(&v)),
+    choice!(
+        "surface_lights.shape",
+        "point or disc",
+        surface_lights.shading.shape,
+        ["point", LightShape::Point],
+        ["disc", LightShape::Disc]
+    ),
+    choice!(
+        "surface_lights.form",
+        "loop, drawn or tiles",
+        surface_lights.shading.form,
+        ["loop", LightForm::Loop],
+        ["drawn", LightForm::Drawn],
+        ["tiles", LightForm::Tiles]
+    ),
+    choice!(
+        "surface_lights.shadows",
+        "off, ambient-occlusion, some or all",
+        surface_lights.shading.shadows,
+        ["off", IndirectShadows::Off],
+        ["ambient-occlusion", IndirectShadows::AmbientOcclusion],
+        ["some", IndirectShadows::Some],
+        ["all", IndirectShadows::All]
+    ),
+    field!("surface_lights.rays", "1 to 4096", surface_lights.shading.rays, |v| (1
+        ..=4096)
+        .contains(&v)),
+    field!(
+        "surface_lights.reach",
+        "above 0: share of the region's radius",
+        surface_lights.shading.reach,
+        |v: f32| v > 0.0 && v.is_finite()
+    ),
+    field!(
+        "surface_lights.threshold",
+        "0 to 1: share of the light",
+        surface_lights.shading.threshold,
+        |v: f32| (0.0..=1.0).contains(&v)
+    ),
     field!("final_gather.map_size", "4 to 8192", final_gather.map_size, |v| (4
         ..=8192)
         .contains(&v)),

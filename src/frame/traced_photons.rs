@@ -1,7 +1,7 @@
 //! A photon map on its way from the lights to the last surface, by whichever tracers the settings choose.
 
+use super::TracerKind;
 use super::indirect_scene::{PhotonInputs, PhotonPasses};
-use super::{Settings, TracerKind};
 use crate::Error;
 #[cfg(feature = "bvh")]
 use crate::pass::{BvhTracerInputs, BvhTracerResources};
@@ -44,13 +44,12 @@ impl TracedPhotons {
     /// `kind`: what traces them, of those that the settings have.
     pub(super) fn new(
         device: &wgpu::Device,
-        settings: &Settings,
-        count: u32,
+        (count, bounces): (u32, u32),
         (map, kind): (PhotonMap, TracerKind),
     ) -> Result<Self, Error> {
         let is_shared = kind == TracerKind::Hybrid;
-        let shared_hops = if is_shared { settings.bounces } else { 0 };
-        let mut photons = Photons::new(device, count, settings.bounces)?;
+        let shared_hops = if is_shared { bounces } else { 0 };
+        let mut photons = Photons::new(device, count, bounces)?;
         photons.set_map(map);
         Ok(Self {
             emitter: PhotonEmitterResources::new(device)?,

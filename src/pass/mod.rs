@@ -26,11 +26,13 @@ pub(crate) mod photon_emitter;
 pub(crate) mod photon_grid;
 pub(crate) mod photon_guiding;
 pub(crate) mod photon_splatter;
+pub(crate) mod photon_stream;
 pub(crate) mod photon_walk;
 mod shadow_map_capture;
 pub(crate) mod soft_shadow;
 pub(crate) mod specular_paths;
 pub(crate) mod stable_sort;
+pub(crate) mod surface_light_shading;
 pub(crate) mod tone_map;
 pub(crate) mod trace_statistics;
 pub(crate) mod upsampler;
@@ -72,6 +74,7 @@ pub use photon_splatter::{
     Bandwidth, BoundaryCorrection, Kernel, MarkedSplatInputs, PhotonSplatter, PhotonSplatterConfig,
     PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings, SplatShape, progressive_scale,
 };
+pub use photon_stream::{ImpactLightInputs, PhotonStream, PhotonStreamInputs, PhotonStreamResources};
 pub use photon_walk::SharedHop;
 pub use shadow_map_capture::{ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources};
 pub(crate) use soft_shadow::{MAX_POINTS, MAX_TAPS};
@@ -80,6 +83,10 @@ pub use soft_shadow::{
     SoftShadowSettings,
 };
 pub use specular_paths::{PathShape, SpecularPaths, SpecularPathsInputs, SpecularPathsResources};
+pub use surface_light_shading::{
+    IndirectShadows, LightForm, LightShape, SurfaceLightRays, SurfaceLightShading, SurfaceLightShadingInputs,
+    SurfaceLightShadingResources, SurfaceLightShadingSettings,
+};
 pub use tone_map::{ToneCurve, ToneMap, ToneMapInputs, ToneMapResources, ToneMapSettings};
 pub use trace_statistics::{HopStatistics, TraceStatistics, TraceStatisticsInputs, TraceStatisticsResources};
 pub use upsampler::{Upsampler, UpsamplerInputs, UpsamplerResources, UpsamplerSettings};

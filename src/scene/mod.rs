@@ -16,6 +16,7 @@ mod mesh;
 pub mod samples;
 mod summary;
 mod suns;
+mod surface_points;
 mod unit_frame;
 
 pub use bounds::{BoundingSphere, SceneBounds};
@@ -30,6 +31,7 @@ pub use material::{Material, Texture};
 pub use mesh::Mesh;
 pub use summary::SceneSummary;
 pub use suns::Sun;
+pub use surface_points::{SurfacePlace, SurfacePoint};
 pub use unit_frame::UnitFrame;
 
 use crate::Error;

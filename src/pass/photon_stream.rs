@@ -1,0 +1,270 @@
+//! Photons to surface lights: each path replaces the oldest of a pool, whose light is taken back; or a light at each impact.
+//!
+//! Inputs: new [`Photons`], [`SurfaceLights`]. Outputs: their flux, and the [`PhotonPool`]. Source: photon streaming with virtual
+//! surface lights, section 0.5 and Algorithm 2, with changes: an impact counts the flux that its surface sends *on*; the pool
+//! holds whole paths, each of the flux that one of as many emitted at once has, so that its energy is the lights'; fluxes are
+//! whole numbers, so that sums never drift, rounded by chance that belongs to the place in the pool.
+//! [`PhotonStream::record_at_impacts`] is instant radiosity (Keller 1997), the paper's baseline.
+//!
+//! Cost: impacts of the new paths; of each, the cells of the grid around it up to the nearest light. Limits: diffuse surfaces alone send light on
+//! here; what glossy ones reflect is photons' matter.
+
+use super::dispatch_64;
+use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
+use crate::resource::{PhotonPool, Photons, SurfaceLights};
+use crate::{Error, Timestamps, wgsl};
+
+pub(crate) mod gpu {
+    use bytemuck::{Pod, Zeroable};
+
+    /// Twin of `Params` in `shaders/pass/photon_stream/params.wgsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Params {
+        pub(crate) path_count: u32,
+        pub(crate) hop_count: u32,
+        pub(crate) first_path: u32,
+        pub(crate) pool_count: u32,
+        pub(crate) row: u32,
+        pub(crate) share: f32,
+    }
+}
+
+/// Bindings of `shaders/pass/photon_stream/stream_impacts.wgsl`, in order.
+pub(crate) const STREAM_SLOTS: [Slot; 7] = [
+    Slot::Uniform,
+    Slot::Uniform,
+    Slot::Storage,
+    Slot::Storage,
+    Slot::Storage,
+    Slot::StorageMut,
+    Slot::StorageMut,
+];
+
+/// Bindings of `shaders/pass/photon_stream/lights_at_impacts.wgsl`, in order.
+pub(crate) const IMPACT_SLOTS: [Slot; 5] = [
+    Slot::Uniform,
+    Slot::Uniform,
+    Slot::Storage,
+    Slot::StorageMut,
+    Slot::StorageMut,
+];
+
+/// The pass.
+#[derive(Debug)]
+pub struct PhotonStream {
+    device: wgpu::Device,
+    stream_layout: wgpu::BindGroupLayout,
+    impact_layout: wgpu::BindGroupLayout,
+    stream: wgpu::ComputePipeline,
+    at_impacts: wgpu::ComputePipeline,
+}
+
+/// Uniforms and bind groups.
+#[derive(Debug)]
+pub struct PhotonStreamResources {
+    params: wgpu::Buffer,
+    stream_groups: BindGroupCache,
+    impact_groups: BindGroupCache,
+}
+
+/// What a frame gives it.
+#[derive(Debug)]
+pub struct PhotonStreamInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// The new paths, traced: no more than the pool holds, of no more hops. Emitted from [`PhotonPool::next`] of the random
+    /// sequence on, and as if there were no others.
+    pub photons: &'a Photons,
+    /// The others.
+    pub pool: &'a mut PhotonPool,
+    /// Where they stand this frame is written.
+    pub lights: &'a SurfaceLights,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+/// What a frame gives it for lights at impacts.
+#[derive(Debug)]
+pub struct ImpactLightInputs<'a> {
+    /// For the uniforms of this frame.
+    pub queue: &'a wgpu::Queue,
+    /// Traced; of as many slots as there is room for lights, or fewer.
+    pub photons: &'a Photons,
+    /// Written.
+    pub lights: &'a mut SurfaceLights,
+    /// Sink for GPU time.
+    pub timestamps: Option<&'a Timestamps>,
+}
+
+impl PhotonStream {
+    /// The pass on this device. Needs no features and no more than default limits.
+    pub fn new(device: &wgpu::Device) -> Self {
+        let stage = wgpu::ShaderStages::COMPUTE;
+        let stream_layout = device::layout(device, "lightfall::PhotonStream", stage, &STREAM_SLOTS);
+        let impact_layout = device::layout(device, "lightfall::PhotonStream::impacts", stage, &IMPACT_SLOTS);
+        let pipeline = |label, source, entry_point, layout| {
+            let spec = ComputeSpec {
+                label,
+                source,
+                entry_point,
+                layouts: &[layout],
+                constants: &[],
+            };
+            device::compute_pipeline(device, &spec)
+        };
+        Self {
+            device: device.clone(),
+            stream: pipeline(
+                "lightfall::PhotonStream",
+                wgsl::PHOTON_STREAM,
+                "stream_impacts",
+                &stream_layout,
+            ),
+            at_impacts: pipeline(
+                "lightfall::PhotonStream::impacts",
+                wgsl::PHOTON_STREAM_AT_IMPACTS,
+                "lights_at_impacts",
+                &impact_layout,
+            ),
+            stream_layout,
+            impact_layout,
+        }
+    }
+
+    /// Records the exchange of the oldest paths for the new ones.
+    ///
+    /// # Errors
+    /// [`Error::CountMismatch`] for more paths, or more hops, than the pool holds; nothing is recorded then.
+    pub fn record(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut PhotonStreamResources,
+        inputs: &mut PhotonStreamInputs<'_>,
+    ) -> Result<(), Error> {
+        let (photons, pool) = (inputs.photons, &mut *inputs.pool);
+        for (what, expected, found) in [
+            (
+                "photons to stream (most that the pool holds)",
+                pool.paths(),
+                photons.count(),
+            ),
+            (
+                "hops of photons to stream (most that the pool holds)",
+                pool.hops(),
+                photons.bounces() + 1,
+            ),
+        ] {
+            if found > expected {
+                let (expected, found) = (expected as usize, found as usize);
+                return Err(Error::CountMismatch { what, expected, found });
+            }
+        }
+        let (first_path, is_stale) = pool.advance(photons.count());
+        if is_stale {
+            encoder.clear_buffer(pool.buffer(), 0, None);
+            inputs.lights.clear_flux(encoder);
+        }
+        if photons.count() == 0 || inputs.lights.count() == 0 {
+            return Ok(());
+        }
+        let (groups, row) = dispatch_64(photons.slots());
+        let params = gpu::Params {
+            path_count: photons.count(),
+            hop_count: photons.bounces() + 1,
+            first_path,
+            pool_count: pool.paths(),
+            row,
+            share: (f64::from(photons.count()) / f64::from(pool.paths())) as f32,
+        };
+        inputs
+            .queue
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        let bound = [
+            (&resources.params).into(),
+            inputs.lights.grid().into(),
+            photons.buffer().into(),
+            inputs.lights.records().into(),
+            inputs.lights.cells().into(),
+            pool.buffer().into(),
+            inputs.lights.flux().into(),
+        ];
+        let label = "lightfall::PhotonStream";
+        let group = resources
+            .stream_groups
+            .get(&self.device, label, &self.stream_layout, &bound);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(&self.stream);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
+        Ok(())
+    }
+
+    /// Records a light at each impact.
+    ///
+    /// # Errors
+    /// [`Error::CountMismatch`] for more slots than there is room for lights.
+    pub fn record_at_impacts(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut PhotonStreamResources,
+        inputs: &mut ImpactLightInputs<'_>,
+    ) -> Result<(), Error> {
+        let photons = inputs.photons;
+        if photons.slots() > inputs.lights.capacity() {
+            return Err(Error::CountMismatch {
+                what: "photons for lights at impacts (most lights that there is room for)",
+                expected: inputs.lights.capacity() as usize,
+                found: photons.slots() as usize,
+            });
+        }
+        inputs.lights.stand_at_impacts(inputs.queue, photons.slots());
+        let (groups, row) = dispatch_64(photons.slots());
+        let params = gpu::Params {
+            path_count: photons.count(),
+            hop_count: photons.bounces() + 1,
+            first_path: 0,
+            pool_count: photons.count(),
+            row,
+            share: 1.0,
+        };
+        inputs
+            .queue
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        let bound = [
+            (&resources.params).into(),
+            inputs.lights.grid().into(),
+            photons.buffer().into(),
+            inputs.lights.records().into(),
+            inputs.lights.flux().into(),
+        ];
+        let label = "lightfall::PhotonStream::impacts";
+        let group = resources
+            .impact_groups
+            .get(&self.device, label, &self.impact_layout, &bound);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(&self.at_impacts);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
+        Ok(())
+    }
+}
+
+impl PhotonStreamResources {
+    /// Resources on this device.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] if the device grants next to nothing.
+    pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
+        Ok(Self {
+            params: device::uniform_buffer::<gpu::Params>(device, "lightfall::PhotonStream::params")?,
+            stream_groups: BindGroupCache::default(),
+            impact_groups: BindGroupCache::default(),
+        })
+    }
+
+    /// Bytes allocated.
+    pub fn memory_use(&self) -> u64 {
+        self.params.size()
+    }
+}

@@ -1,0 +1,106 @@
+//! The photons that surface lights are made of: a ring of paths.
+
+use crate::{Error, gpu as device};
+
+pub(crate) mod gpu {
+    use bytemuck::{Pod, Zeroable};
+
+    /// Twin of `Impact` in `shaders/pass/photon_stream/stream_impacts.wgsl`.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Impact {
+        pub(crate) light: u32,
+        pub(crate) red: u32,
+        pub(crate) green: u32,
+        pub(crate) blue: u32,
+    }
+}
+
+/// Paths that are replaced one after the other, the oldest first: of each impact the light that it counts for, and what it counts there, in
+/// whole steps; a storage buffer of 16 bytes an impact, `hop` × paths + `path` in order. Emptied where lights are other ones
+/// ([`PhotonPool::restart`]).
+#[derive(Debug)]
+pub struct PhotonPool {
+    buffer: wgpu::Buffer,
+    paths: u32,
+    hops: u32,
+    /// The oldest path.
+    next: u32,
+    /// Paths that were streamed since the last restart.
+    streamed: u64,
+    is_stale: bool,
+}
+
+impl PhotonPool {
+    /// Bytes of a pool.
+    pub fn size_in_bytes(paths: u32, hops: u32) -> u64 {
+        u64::from(paths.max(1)) * u64::from(hops.max(1)) * size_of::<gpu::Impact>() as u64
+    }
+
+    /// Room for `paths` of up to `hops` impacts each: [`Photons::bounces`](super::Photons::bounces) + 1 of the photons
+    /// that are streamed.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`].
+    pub fn new(device: &wgpu::Device, paths: u32, hops: u32) -> Result<Self, Error> {
+        use wgpu::BufferUsages as B;
+        let bytes = Self::size_in_bytes(paths, hops);
+        let usage = B::STORAGE | B::COPY_DST | B::COPY_SRC;
+        Ok(Self {
+            buffer: device::buffer(device, "lightfall::PhotonPool", bytes, usage)?,
+            paths: paths.max(1),
+            hops: hops.max(1),
+            next: 0,
+            streamed: 0,
+            is_stale: false,
+        })
+    }
+
+    /// Empties it with the next photons that are streamed, and takes all flux from the lights: for other lights, or another
+    /// unit frame. Between, the old light stays.
+    pub fn restart(&mut self) {
+        self.is_stale = true;
+        self.next = 0;
+        self.streamed = 0;
+    }
+
+    /// Of so many new paths, the place of the first; whether the pool is to be emptied before.
+    pub(crate) fn advance(&mut self, paths: u32) -> (u32, bool) {
+        let first = self.next;
+        self.next = (first + paths) % self.paths;
+        self.streamed += u64::from(paths);
+        (first, std::mem::take(&mut self.is_stale))
+    }
+
+    /// The impacts.
+    pub fn buffer(&self) -> &wgpu::Buffer {
+        &self.buffer
+    }
+
+    /// Paths that it holds.
+    pub fn paths(&self) -> u32 {
+        self.paths
+    }
+
+    /// Most impacts of a path.
+    pub fn hops(&self) -> u32 {
+        self.hops
+    }
+
+    /// The path that is replaced next. Emit photons from this index of the random sequence, and a path that comes again is the
+    /// same one: where nothing moves nothing changes, to the bit.
+    pub fn next(&self) -> u32 {
+        self.next
+    }
+
+    /// Which part of the paths is there since the last restart, and of their flux: above 0 and at most 1. What surface lights
+    /// shine while the pool fills is to be divided by it.
+    pub fn share(&self) -> f32 {
+        (self.streamed.clamp(1, u64::from(self.paths)) as f64 / f64::from(self.paths)) as f32
+    }
+
+    /// Bytes this resource allocated.
+    pub fn memory_use(&self) -> u64 {
+        self.buffer.size()
+    }
+}
