@@ -379,7 +379,7 @@ fn twins() -> Vec<Twin> {
             origin, cell, cells, count, steps, _pad,
         }),
         twin!(wgsl::SURFACE_LIGHT_LOOP, "Params", surface_light_shading::gpu::Params {
-            factor, light_count, flux_of_step, are_discs, least, ray_count, first_row, row_count, shadows, reach, sample_offset,
+            factor, light_count, flux_of_step, shape, least, ray_count, first_row, row_count, shadows, reach, sample_offset,
         }),
         twin!(wgsl::TRACE_STATISTICS, "Params", trace_statistics::gpu::Params { photon_count }),
         twin!(wgsl::TRACE_STATISTICS, "Sums", trace_statistics::gpu::Sums { stored, tentative, absorbed, escaped, lost }),

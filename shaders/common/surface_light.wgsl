@@ -23,14 +23,3 @@ struct SurfaceLightGrid {
 }
 
 const SURFACE_LIGHT_PI: f32 = 3.14159265;
-
-// Irradiance at a point from a light of flux 1, if nothing is in the way: of its disc, on whose axis this is exact where the
-// receiver faces it, or of a point.
-fn surface_light_factor(light: SurfaceLight, p: vec3f, n: vec3f) -> f32 {
-    let away = light.position - p;
-    let distance_squared = dot(away, away);
-    let cosines = max(dot(n, away), 0.0) * max(-dot(light.normal, away), 0.0);
-    let spread = SURFACE_LIGHT_PI * distance_squared + light.area;
-    // Both cosines lack their distance.
-    return cosines / max(distance_squared * spread, 0x1p-60);
-}

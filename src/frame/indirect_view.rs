@@ -23,7 +23,9 @@ pub(super) const MOST_RAYS: u64 = 1 << 21;
 pub(super) struct ViewPasses {
     pub(super) photon_splatter: PhotonSplatter,
     /// If they gather.
-    final_gather: Option<(FinalGather, IrradianceFilter)>,
+    final_gather: Option<FinalGather>,
+    /// If they even noise out.
+    irradiance_filter: Option<IrradianceFilter>,
     /// If the settings take surface lights.
     pub(super) surface_light_shading: Option<SurfaceLightShading>,
     upsampler: Upsampler,
@@ -37,6 +39,8 @@ pub(super) struct ViewPasses {
 pub(super) struct IndirectView {
     estimate: Estimate,
     estimated: Irradiance,
+    /// If noise is evened out: what it was before.
+    filter: Option<(Irradiance, IrradianceFilterResources)>,
     subsampling: Subsampling,
     /// If photons are guided.
     guiding: Option<PhotonGuidingResources>,
@@ -59,8 +63,6 @@ struct GatherView {
     band_rows: u32,
     /// Of each band.
     own: Vec<FinalGatherResources>,
-    /// If noise is evened out: what it was before.
-    filter: Option<(Irradiance, IrradianceFilterResources)>,
     tracers: ViewTracers,
 }
 
@@ -106,7 +108,8 @@ impl ViewPasses {
         let gathers = settings.indirect_method == IndirectMethod::FinalGather;
         Ok(Self {
             photon_splatter: PhotonSplatter::new(device, &settings.splatter_config)?,
-            final_gather: gathers.then(|| (FinalGather::new(device), IrradianceFilter::new(device))),
+            final_gather: gathers.then(|| FinalGather::new(device)),
+            irradiance_filter: (settings.filter_radius() > 0).then(|| IrradianceFilter::new(device)),
             surface_light_shading: (settings.indirect_method == IndirectMethod::SurfaceLights)
                 .then(|| SurfaceLightShading::new(device)),
             upsampler: Upsampler::new(device),
@@ -145,6 +148,11 @@ impl IndirectView {
                 Estimate::SurfaceLights(Box::new(SurfaceLightView::new(device)?))
             }
         };
+        let filter = || -> Result<_, Error> {
+            let noisy = Irradiance::new(device, estimated, format)?;
+            Ok((noisy, IrradianceFilterResources::new(device)?))
+        };
+        let filter = (settings.filter_radius() > 0).then(filter).transpose()?;
         let estimated = Irradiance::new(device, estimated, format)?;
         let by_levels = settings.upsampling == Upsampling::ByLevels;
         let mut levels = Vec::new();
@@ -163,6 +171,7 @@ impl IndirectView {
         Ok(Self {
             estimate,
             estimated,
+            filter,
             subsampling: settings.subsampling,
             guiding: guiding.transpose()?,
             levels,
@@ -205,14 +214,37 @@ impl IndirectView {
         encoder: &mut wgpu::CommandEncoder,
         inputs: &IndirectViewInputs<'_>,
     ) -> Result<(), Error> {
+        let estimated = self.filter.as_ref().map_or(&self.estimated, |f| &f.0);
         match &mut self.estimate {
-            Estimate::Splatting(own) => splat(encoder, own, &self.estimated, inputs),
-            Estimate::FinalGather(own) => own.record(encoder, &self.estimated, inputs)?,
-            Estimate::SurfaceLights(own) => own.record(encoder, &self.estimated, inputs)?,
+            Estimate::Splatting(own) => splat(encoder, own, estimated, inputs),
+            Estimate::FinalGather(own) => own.record(encoder, estimated, inputs)?,
+            Estimate::SurfaceLights(own) => own.record(encoder, estimated, inputs)?,
         }
+        self.even_out(encoder, inputs);
         self.upsample(encoder, inputs);
         self.count_guiding(encoder, inputs);
         Ok(())
+    }
+
+    /// Records what evens out the noise of rays.
+    fn even_out(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &IndirectViewInputs<'_>) {
+        let (Some(pass), Some((noisy, own))) = (&inputs.passes.0.irradiance_filter, &mut self.filter) else {
+            return;
+        };
+        let filter_inputs = IrradianceFilterInputs {
+            queue: inputs.view.queue,
+            g_buffer: inputs.g_buffer,
+            subsampling: inputs.settings.subsampling,
+            estimate: noisy,
+            irradiance: &self.estimated,
+            settings: &IrradianceFilterSettings {
+                radius: inputs.settings.filter_radius(),
+                normal_agreement: inputs.settings.upsampler.normal_agreement,
+                plane_distance: inputs.settings.upsampler.plane_distance,
+            },
+            timestamps: inputs.view.timestamps,
+        };
+        pass.record(encoder, own, &filter_inputs);
     }
 
     /// Records the levels between the pixels that were estimated and all of them.
@@ -276,6 +308,9 @@ impl IndirectView {
             Estimate::FinalGather(own) => ("final_gather", own.memory_use()),
             Estimate::SurfaceLights(own) => ("surface_light_shading", own.memory_use()),
         });
+        if let Some((noisy, own)) = &self.filter {
+            list.push(("irradiance_filter", noisy.memory_use() + own.memory_use()));
+        }
         if let Some(guiding) = &self.guiding {
             list.push(("photon_guiding", guiding.memory_use()));
         }
@@ -315,10 +350,6 @@ fn splat(
 
 impl GatherView {
     fn new(device: &wgpu::Device, settings: &Settings, size: [u32; 2]) -> Result<Self, Error> {
-        let filter = || -> Result<_, Error> {
-            let gathered = Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?;
-            Ok((gathered, IrradianceFilterResources::new(device)?))
-        };
         let rays_a_row = u64::from(size[0]) * u64::from(settings.final_gather.rays);
         let band_rows = (MOST_RAYS / rays_a_row).clamp(1, u64::from(size[1])) as u32;
         let rays = u32::try_from(rays_a_row * u64::from(band_rows)).unwrap_or(u32::MAX);
@@ -327,7 +358,6 @@ impl GatherView {
             rays: SurfaceRays::new(device, rays)?,
             band_rows,
             own: own.collect::<Result<_, _>>()?,
-            filter: (settings.final_gather.filter_radius > 0).then(filter).transpose()?,
             tracers: ViewTracers::new(device)?,
         })
     }
@@ -339,7 +369,7 @@ impl GatherView {
         estimated: &Irradiance,
         inputs: &IndirectViewInputs<'_>,
     ) -> Result<(), Error> {
-        let (Some((pass, filter)), Some(env_maps), Some(light)) = (
+        let (Some(pass), Some(env_maps), Some(light)) = (
             &inputs.passes.0.final_gather,
             inputs.scene.env_maps(),
             inputs.scene.env_map_irradiance(),
@@ -355,7 +385,7 @@ impl GatherView {
             rays: &self.rays,
             env_maps,
             light,
-            irradiance: self.filter.as_ref().map_or(estimated, |f| &f.0),
+            irradiance: estimated,
             sample_offset: inputs.sample_offset,
             timestamps: inputs.view.timestamps,
         };
@@ -369,29 +399,12 @@ impl GatherView {
             pass.record(encoder, own, &gather_inputs);
             gather_inputs.rows[0] += self.band_rows;
         }
-        if let Some((gathered, own)) = &mut self.filter {
-            let filter_inputs = IrradianceFilterInputs {
-                queue: inputs.view.queue,
-                g_buffer: inputs.g_buffer,
-                subsampling: inputs.settings.subsampling,
-                estimate: gathered,
-                irradiance: estimated,
-                settings: &IrradianceFilterSettings {
-                    radius: inputs.settings.final_gather.filter_radius,
-                    normal_agreement: inputs.settings.upsampler.normal_agreement,
-                    plane_distance: inputs.settings.upsampler.plane_distance,
-                },
-                timestamps: inputs.view.timestamps,
-            };
-            filter.record(encoder, own, &filter_inputs);
-        }
         Ok(())
     }
 
     fn memory_use(&self) -> u64 {
-        let filter = self.filter.as_ref().map_or(0, |f| f.0.memory_use() + f.1.memory_use());
         let own: u64 = self.own.iter().map(FinalGatherResources::memory_use).sum();
-        self.rays.memory_use() + own + filter + self.tracers.memory_use()
+        self.rays.memory_use() + own + self.tracers.memory_use()
     }
 }
 

@@ -292,7 +292,17 @@ fn estimates(indirect: &(bool, String), settings: &Settings) -> Estimates {
             IndirectMethod::Splatting => "settings take the photons around",
             _ => "settings take surface lights",
         }),
-        filtering: off("no noise of rays"),
+        filtering: match settings.filter_radius() {
+            _ if settings.indirect_method == IndirectMethod::Splatting => off("no noise of rays"),
+            0 => off("settings leave the noise of rays"),
+            radius => (
+                indirect.0,
+                match indirect.0 {
+                    true => format!("noise of rays over {radius} pixel(s) to each side"),
+                    false => indirect.1.clone(),
+                },
+            ),
+        },
         streaming: off("settings take no surface lights"),
         shading: off("settings take no surface lights"),
     };
@@ -303,10 +313,6 @@ fn estimates(indirect: &(bool, String), settings: &Settings) -> Estimates {
         IndirectMethod::Splatting => all.splatting = indirect.clone(),
         IndirectMethod::FinalGather => {
             all.gathering = (true, format!("{} rays a pixel", gathers.rays));
-            all.filtering = match gathers.filter_radius {
-                0 => (false, "settings leave the noise of rays".to_owned()),
-                radius => (true, format!("noise of rays over {radius} pixel(s) to each side")),
-            };
         }
         IndirectMethod::SurfaceLights => {
             let pool = match lights.placement {

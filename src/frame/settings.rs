@@ -82,6 +82,8 @@ pub struct SurfaceLightSettings {
     pub placement: LightPlacement,
     /// How they come to pixels.
     pub shading: SurfaceLightShadingSettings,
+    /// Estimated pixels to each side that the noise of [`IndirectShadows::Some`] is evened out over, 0 to 16.
+    pub filter_radius: u32,
 }
 
 impl Default for SurfaceLightSettings {
@@ -92,6 +94,7 @@ impl Default for SurfaceLightSettings {
             stream: 5000,
             placement: LightPlacement::default(),
             shading: SurfaceLightShadingSettings::default(),
+            filter_radius: 1,
         }
     }
 }
@@ -429,6 +432,17 @@ impl Settings {
         }
     }
 
+    /// Estimated pixels to each side that noise is evened out over; 0: it stays.
+    pub(super) fn filter_radius(&self) -> u32 {
+        let lights = &self.surface_lights;
+        match self.indirect_method {
+            IndirectMethod::Splatting => 0,
+            IndirectMethod::FinalGather => self.final_gather.filter_radius,
+            IndirectMethod::SurfaceLights if lights.shading.shadows == IndirectShadows::Some => lights.filter_radius,
+            IndirectMethod::SurfaceLights => 0,
+        }
+    }
+
     /// Paths that the pool holds: whole frames of them.
     pub(super) fn pool_paths(&self) -> u32 {
         let own = &self.surface_lights;
@@ -750,10 +764,11 @@ const KNOBS: &[Knob] = &[
         .contains(&v)),
     choice!(
         "surface_lights.shape",
-        "point or disc",
+        "point, disc or square",
         surface_lights.shading.shape,
         ["point", LightShape::Point],
-        ["disc", LightShape::Disc]
+        ["disc", LightShape::Disc],
+        ["square", LightShape::Square]
     ),
     choice!(
         "surface_lights.form",
@@ -775,6 +790,12 @@ const KNOBS: &[Knob] = &[
     field!("surface_lights.rays", "1 to 4096", surface_lights.shading.rays, |v| (1
         ..=4096)
         .contains(&v)),
+    field!(
+        "surface_lights.filter_radius",
+        "0 to 16",
+        surface_lights.filter_radius,
+        |v| v <= MOST_FILTER_RADIUS
+    ),
     field!(
         "surface_lights.reach",
         "above 0: share of the region's radius",

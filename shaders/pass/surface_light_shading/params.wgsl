@@ -6,8 +6,8 @@ struct Params {
     light_count: u32,
     // Unit-frame flux of a step
     flux_of_step: f32,
-    // 1: lights are discs of the surface that they stand for; 0: points
-    are_discs: u32,
+    // A `SHAPE_`
+    shape: u32,
     // Irradiance below which a light does not count
     least: f32,
     // Of a pixel, where shadows are traced
@@ -26,11 +26,35 @@ fn light_flux(index: u32) -> vec3f {
     return vec3f(flux[index].xyz) * params.flux_of_step;
 }
 
+// Numbers of `LightShape`.
+const SHAPE_POINT: u32 = 0u;
+const SHAPE_DISC: u32 = 1u;
+const SHAPE_SQUARE: u32 = 2u;
+
+// Beyond so many times the square root of its area a square is as good as a point.
+const SQUARE_NEAR: f32 = 3.0;
+
+// Irradiance at a point from a light of flux 1, if nothing is in the way.
+fn light_factor(light: SurfaceLight, p: vec3f, n: vec3f) -> f32 {
+    let away = light.position - p;
+    let distance_squared = dot(away, away);
+    if params.shape == SHAPE_SQUARE && distance_squared < SQUARE_NEAR * SQUARE_NEAR * light.area {
+        let frame = sampling_frame(light.normal);
+        let half_side = 0.5 * sqrt(light.area);
+        let corner = light.position - half_side * (frame[0] + frame[1]);
+        let sides = 2.0 * half_side * mat2x3f(frame[0], frame[1]);
+        let square = Polygon(corner, 4u, sides[0], 1.0, sides[1], light.area, vec3f(1.0));
+        return polygon_irradiance(square, p, n) / (SURFACE_LIGHT_PI * light.area);
+    }
+    let cosines = max(dot(n, away), 0.0) * max(-dot(light.normal, away), 0.0);
+    let spread = SURFACE_LIGHT_PI * distance_squared + select(0.0, light.area, params.shape == SHAPE_DISC);
+    // Both cosines lack their distance.
+    return cosines / max(distance_squared * spread, 0x1p-60);
+}
+
 // Irradiance that it gives, if nothing is in the way.
 fn irradiance_of(index: u32, p: vec3f, n: vec3f) -> vec3f {
-    var light = lights[index];
-    light.area *= f32(params.are_discs);
-    return light_flux(index) * surface_light_factor(light, p, n);
+    return light_flux(index) * light_factor(lights[index], p, n);
 }
 
 // A ball outside of which a light does not count: its irradiance, wherever the receiver faces, is at most

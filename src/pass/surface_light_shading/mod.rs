@@ -29,7 +29,7 @@ pub(crate) mod gpu {
         pub(crate) factor: u32,
         pub(crate) light_count: u32,
         pub(crate) flux_of_step: f32,
-        pub(crate) are_discs: u32,
+        pub(crate) shape: u32,
         pub(crate) least: f32,
         pub(crate) ray_count: u32,
         pub(crate) first_row: u32,
@@ -65,14 +65,16 @@ pub(crate) const DRAW_SLOTS: [Slot; 8] = [
     Slot::Storage,
 ];
 
-/// What a light is to a receiver near by.
+/// What a light is to a receiver near by. Numbers of `SHAPE_POINT` and so on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum LightShape {
     /// A point: as bright as one likes near by.
-    Point,
+    Point = 0,
     /// A disc of as much surface as it stands for: at most as bright as that surface. Of lights at impacts, which stand for none, a point.
+    Disc = 1,
+    /// A square of as much surface, by Lambert's formula, within three of its sides.
     #[default]
-    Disc,
+    Square = 2,
 }
 
 /// How lights come to pixels, where they throw no shadows.
@@ -204,7 +206,7 @@ impl SurfaceLightShadingInputs<'_> {
             factor: self.subsampling.factor(),
             light_count: lights,
             flux_of_step: self.lights.flux_of_step() / self.share,
-            are_discs: u32::from(self.settings.shape == LightShape::Disc),
+            shape: self.settings.shape as u32,
             // All lights give no more than the unit frame's flux, 1.
             least: self.settings.threshold / (self.area * lights.max(1) as f32),
             ray_count,
