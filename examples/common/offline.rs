@@ -39,7 +39,7 @@ pub(crate) struct Offline<'a> {
     /// Whether every frame is taken for one of a scene that changes; not while frames are accumulated.
     pub(crate) in_motion: bool,
     /// Where surface lights stand, if there are any.
-    points: Vec<SurfacePoint>,
+    pub(crate) points: Vec<SurfacePoint>,
     scene: Scene,
     summary: SceneSummary,
     camera: usize,

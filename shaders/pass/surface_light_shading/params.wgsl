@@ -31,8 +31,8 @@ const SHAPE_POINT: u32 = 0u;
 const SHAPE_DISC: u32 = 1u;
 const SHAPE_SQUARE: u32 = 2u;
 
-// Beyond so many times the square root of its area a square is as good as a point.
-const SQUARE_NEAR: f32 = 3.0;
+// Beyond so many of its sides a square is as good as a point, to some hundredths where it grazes.
+const SQUARE_NEAR: f32 = 5.0;
 
 // Irradiance at a point from a light of flux 1, if nothing is in the way.
 fn light_factor(light: SurfaceLight, p: vec3f, n: vec3f) -> f32 {

@@ -72,7 +72,7 @@ pub enum LightShape {
     Point = 0,
     /// A disc of as much surface as it stands for: at most as bright as that surface. Of lights at impacts, which stand for none, a point.
     Disc = 1,
-    /// A square of as much surface, by Lambert's formula, within three of its sides.
+    /// A square of as much surface, by Lambert's formula, within five of its sides.
     #[default]
     Square = 2,
 }
