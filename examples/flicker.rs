@@ -55,7 +55,8 @@ struct Arguments {
     /// fast, balanced, accurate; frames are not accumulated
     #[arg(long, default_value = "balanced")]
     preset: String,
-    /// How photons find what they hit: image-space, hybrid, bvh
+    /// How photons find what they hit: image-space, hybrid, bvh; with :METHOD behind it, as in bvh:surface-lights, how light comes to
+    /// pixels
     #[arg(long, value_delimiter = ',', default_values = TRACERS)]
     tracers: Vec<String>,
     /// Any field of Settings but frames and tracer.kind, repeatable; an unknown key lists them all
@@ -132,9 +133,10 @@ fn settings(arguments: &Arguments) -> Result<Settings, String> {
 fn with_tracers<'a>(settings: &Settings, names: &'a [String]) -> Result<Vec<(&'a str, Settings)>, String> {
     let with_tracer = |name: &'a String| {
         let mut settings = settings.clone();
-        settings
-            .set("tracer.kind", name)
-            .map_err(|error| format!("--tracers: {error}"))?;
+        let (tracer, method) = name.split_once(':').unzip();
+        let mut set = |key, value| settings.set(key, value).map_err(|error| format!("--tracers: {error}"));
+        set("tracer.kind", tracer.unwrap_or(name))?;
+        method.map(|method| set("indirect.method", method)).transpose()?;
         Ok((name.as_str(), settings))
     };
     names.iter().map(with_tracer).collect()

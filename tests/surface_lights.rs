@@ -3,13 +3,14 @@
 mod common;
 
 use common::{Component, Gpu, Offline, Wishes, assert_no_errors, gpu, gpu_with};
-use lightfall::frame::{IndirectMethod, LightPlacement, Settings};
+use lightfall::frame::{IndirectMethod, LightPlacement, PhotonFeeder, Settings};
 use lightfall::glam::{DVec3, Vec3};
 use lightfall::pass::*;
 use lightfall::resource::*;
 use lightfall::scene::{LightKind, Scene, SceneBounds, SurfacePlace, UnitFrame, samples};
 use lightfall::{Error, creation_count, read_buffer_blocking, wgpu};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// A unit frame that is the world.
 fn unit_frame() -> UnitFrame {
@@ -339,6 +340,31 @@ fn a_pool_that_is_filled_at_once_is_the_one_that_frames_fill() {
     // Until something moves.
     at_once.renderer.geometry_changed();
     assert_eq!(passes(&mut at_once), busy);
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn after_many_moves_the_picture_is_that_of_a_fresh_start() {
+    let Some(gpu) = gpu() else { return };
+    let settings = settings(&[("surface_lights.shadows", "off")]);
+    let fresh = picture(&gpu, &samples::cornell(0.0), &settings);
+    let mut offline = offline(&gpu, &samples::cornell(0.0), &settings);
+    offline.render_frame(None).unwrap();
+    // A block that slides, and a light that wanders; then all is as it was, and the pool is replaced once.
+    for i in 1..20 {
+        let mut scene = samples::cornell(0.1 * f64::from(i));
+        if let LightKind::Point { position, .. } = &mut scene.lights[0].kind {
+            position.z += 0.05 * f64::from(i % 7);
+        }
+        offline.set_scene(scene).unwrap();
+        offline.render_frame(None).unwrap();
+    }
+    assert!(offline.read().unwrap() != fresh);
+    offline.set_scene(samples::cornell(0.0)).unwrap();
+    for _ in 0..8 {
+        offline.render_frame(None).unwrap();
+    }
+    assert!(offline.read().unwrap() == fresh);
     assert_no_errors(&gpu);
 }
 
@@ -705,5 +731,44 @@ fn what_is_missing_or_bad_is_named() {
         ),
         "{found:?}"
     );
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn photons_of_the_processor_bring_the_same_light() {
+    let Some(gpu) = gpu() else { return };
+    for scene in [samples::cornell(0.0), samples::cornell_spot(0.0)] {
+        let settings = settings(&[("surface_lights.shadows", "off"), ("surface_lights.stream", "2000")]);
+        let mut offline = offline(&gpu, &scene, &settings);
+        offline.render_frame(None).unwrap();
+        let expected = offline.read().unwrap();
+        let feeder = PhotonFeeder::new(2000, settings.bounces - 1, 2);
+        feeder.set_scene(offline.renderer.frame().unwrap(), &Arc::new(scene.clone()));
+        offline.renderer.set_photon_feeder(Some(feeder));
+        let next = |offline: &Offline<'_>| offline.renderer.photon_pool().unwrap().next();
+        let mut brought = 0;
+        for _ in 0..2000 {
+            let before = next(&offline);
+            offline.render_frame(None).unwrap();
+            brought += u32::from(next(&offline) != before);
+            if brought == 4 {
+                break;
+            }
+        }
+        assert_eq!(brought, 4, "batches");
+        let found = offline.read().unwrap();
+        let feeder = offline.renderer.set_photon_feeder(None).unwrap();
+        println!(
+            "mean {:.5} of {:.5}, {:.2e} impacts a second",
+            mean(&found),
+            mean(&expected),
+            feeder.impacts_per_second()
+        );
+        assert!(found != expected);
+        assert!((mean(&found) / mean(&expected) - 1.0).abs() < 0.03);
+        // Of other photons than are wanted nothing is taken.
+        let other = Photons::new(&gpu.device, 100, 0).unwrap();
+        assert!(!feeder.upload(&gpu.queue, &other));
+    }
     assert_no_errors(&gpu);
 }

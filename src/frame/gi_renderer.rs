@@ -5,6 +5,8 @@
 //! for, submitted or, once settled, allocated on the way. One small result comes back by itself: where environment maps
 //! should stand.
 
+#[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
+use super::PhotonFeeder;
 use super::caustic_view::CausticView;
 use super::direct_scene::{DirectScene, ShadowPasses};
 use super::direct_view::{DirectPasses, DirectView, DirectViewInputs, FusedParts};
@@ -54,6 +56,8 @@ pub struct GiRenderer {
     placement: EnvMapPlacement,
     /// World space, as the host last gave them.
     surface_places: Vec<SurfacePlace>,
+    #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
+    photon_feeder: Option<PhotonFeeder>,
     /// Changes whenever a resource that views bind is made anew; no two renderers share one.
     generation: u64,
     /// Counts changes of light and geometry.
@@ -203,6 +207,8 @@ impl GiRenderer {
             stand_ins: StandIns::default(),
             placement: EnvMapPlacement::default(),
             surface_places: Vec::new(),
+            #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
+            photon_feeder: None,
             generation: next_generation(),
             revision: 0,
             views: Vec::new(),
@@ -564,6 +570,22 @@ impl GiRenderer {
         self.record_photons(encoder, inputs)
     }
 
+    /// Takes the photons of surface lights from threads of the processor instead of tracers on the GPU; `None`: from tracers again. The
+    /// host tells it of scenes ([`PhotonFeeder::set_scene`]). In frames that find no batch ready, the pool stays as it was. Of
+    /// [`SurfaceLightSettings::stream`](super::SurfaceLightSettings::stream) paths, and one bounce less than
+    /// [`Settings::bounces`]. Returns the one before.
+    #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
+    pub fn set_photon_feeder(&mut self, feeder: Option<PhotonFeeder>) -> Option<PhotonFeeder> {
+        self.revision += 1;
+        std::mem::replace(&mut self.photon_feeder, feeder)
+    }
+
+    /// What brings photons instead of tracers.
+    #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
+    pub fn photon_feeder(&self) -> Option<&PhotonFeeder> {
+        self.photon_feeder.as_ref()
+    }
+
     /// Traces all of the photons that surface lights are made of, at once instead of over many frames: at the start, after a cut.
     /// Submits what it records and does not wait; call it after `prepare`, before `record_scene`. Nothing where there is no
     /// pool.
@@ -619,6 +641,8 @@ impl GiRenderer {
                 layers: &self.env_map_layers,
                 updates_guiding: self.guiding.take_update(),
                 revision: self.revision,
+                #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
+                feeder: self.photon_feeder.as_ref(),
                 area: self.state.as_ref().map_or(1.0, |s| s.area),
                 radius: self.state.as_ref().map_or(1.0, |s| s.frame.radius()),
             };

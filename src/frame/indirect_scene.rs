@@ -1,5 +1,7 @@
 //! What all views share of indirect light: photons, and what the settings let them meet.
 
+#[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
+use super::PhotonFeeder;
 use super::surface_light_scene::SurfaceLightScene;
 use super::traced_photons::{TracedPhotons, WalkInputs};
 use super::{GlossyMethod, IndirectMethod, SceneInputs, Settings, TracerKind};
@@ -84,6 +86,9 @@ pub(super) struct PhotonInputs<'a> {
     pub(super) updates_guiding: bool,
     /// Of lights and geometry.
     pub(super) revision: u64,
+    /// What brings photons instead of tracers, for surface lights.
+    #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
+    pub(super) feeder: Option<&'a PhotonFeeder>,
     /// Of all surfaces, unit frame.
     pub(super) area: f32,
     /// Of the region, unit frame.

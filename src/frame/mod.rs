@@ -9,6 +9,8 @@ mod gi_renderer;
 mod guiding_schedule;
 mod indirect_scene;
 mod indirect_view;
+#[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
+mod photon_feeder;
 mod plan;
 mod recapture;
 mod selection_schedule;
@@ -20,6 +22,8 @@ mod surface_light_view;
 mod traced_photons;
 
 pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};
+#[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
+pub use photon_feeder::PhotonFeeder;
 pub use plan::{Plan, PlannedStage, Stage};
 pub use settings::{
     CausticSettings, FinalGatherSettings, GlossyMethod, IndirectMethod, LightPlacement, Settings, SurfaceLightSettings,

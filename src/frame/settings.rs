@@ -272,6 +272,11 @@ impl Settings {
             env_map_size: 64,
             environment_suns: 8,
             shadow_map_size: 256,
+            soft_shadow: SoftShadowSettings {
+                search_taps: 2,
+                blur_taps: 3,
+                ..Default::default()
+            },
             selector: EnvMapSelectorSettings {
                 candidates: 40,
                 ..Default::default()
@@ -306,7 +311,10 @@ impl Settings {
             env_map_size: 128,
             environment_suns: 24,
             shadow_map_size: 512,
-            soft_shadow: SoftShadowSettings::default(),
+            soft_shadow: SoftShadowSettings {
+                blur_taps: 7,
+                ..Default::default()
+            },
             soft_lights: MAX_LIGHTS as u32,
             selector: EnvMapSelectorSettings::default(),
             tracer_kind: TracerKind::default(),

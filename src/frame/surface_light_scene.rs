@@ -101,7 +101,9 @@ impl SurfaceLightScene {
             return Ok(());
         };
         inputs.sample_offset = first;
-        traced.record(encoder, passes, &inputs)?;
+        if !bring_photons(encoder, passes, traced, &inputs)? {
+            return Ok(());
+        }
         let (queue, timestamps) = (inputs.photons.scene.queue, inputs.photons.scene.timestamps);
         let (photons, lights) = (&traced.photons, &mut self.lights);
         let Some(pool) = &mut self.pool else {
@@ -141,4 +143,19 @@ impl SurfaceLightScene {
         let pool = self.pool.as_ref().map_or(0, PhotonPool::memory_use);
         self.lights.memory_use() + pool + self.own.memory_use()
     }
+}
+
+/// Whether new photons are there: from threads of the processor, if there are any, when they are ready; else traced here.
+fn bring_photons(
+    encoder: &mut wgpu::CommandEncoder,
+    passes: &PhotonPasses,
+    traced: &mut TracedPhotons,
+    inputs: &WalkInputs<'_>,
+) -> Result<bool, Error> {
+    #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
+    if let Some(feeder) = inputs.photons.feeder {
+        return Ok(feeder.upload(inputs.photons.scene.queue, &traced.photons));
+    }
+    traced.record(encoder, passes, inputs)?;
+    Ok(true)
 }

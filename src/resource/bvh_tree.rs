@@ -60,7 +60,7 @@ impl Tree {
         }
         // The first will do but for boxes that only a lopsided tree suits, such as nested ones.
         for (binary_levels, is_improved) in [(BINARY_LEVELS, true), (BINARY_LEVELS, false), (levels, false)] {
-            let mut binary = binary_tree(boxes.clone(), binary_levels);
+            let mut binary = binary_tree_of(boxes.clone(), binary_levels);
             if is_improved {
                 let part = (REINSERTED / binary.nodes.len() as f32).min(REINSERTED_PART);
                 ReinsertionOptimizer::default().run(&mut binary, part, None);
@@ -105,7 +105,16 @@ struct Item {
     index: u32,
 }
 
-fn binary_tree(boxes: impl Iterator<Item = Aabb>, levels: u32) -> Bvh2 {
+/// A tree of two children a node, for rays that the processor follows.
+#[cfg(not(target_arch = "wasm32"))]
+pub(crate) fn binary_tree(boxes: impl ExactSizeIterator<Item = Aabb>) -> Bvh2 {
+    match boxes.len() {
+        0 => Bvh2::default(),
+        _ => binary_tree_of(boxes, BINARY_LEVELS),
+    }
+}
+
+fn binary_tree_of(boxes: impl Iterator<Item = Aabb>, levels: u32) -> Bvh2 {
     let mut items: Vec<_> = (0..).zip(boxes).map(|(index, bounds)| Item { bounds, index }).collect();
     let all = union(&items);
     let reach = all.min.abs().max(all.max.abs()).max_element();

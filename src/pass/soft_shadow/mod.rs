@@ -96,14 +96,17 @@ pub struct SoftShadowSettings {
     /// Where the width of penumbrae comes from, in image space. Off saves the search and gets widths wrong.
     pub search: PenumbraSearch,
     /// Taps on each of the four arms of the search, up to 64, of `Pcss` a quarter of them. More find smaller occluders and
-    /// steadier widths, at a cost in proportion.
+    /// steadier widths, at a cost in proportion: 2 instead of 4, with 3 to blur instead of 5, have 1.15 times the error for three quarters
+    /// of the time.
     pub search_taps: u32,
-    /// Taps of a `Cross` to each side of each axis, up to 64. More have less grain in wide penumbrae, at a cost in
-    /// proportion.
+    /// Taps of a `Cross` to each side of each axis, 1 to 64. More have less grain in wide penumbrae, at a cost in
+    /// proportion: 7 instead of 5 have 0.95 of the error for a tenth more time, 20 with 16 to search 0.9 for 2.7 times the time.
     pub blur_taps: u32,
-    /// Taps of a `Disc`, `Pcf` and `Pcss`, up to 4096, likewise.
+    /// Taps of a `Disc`, `Pcf` and `Pcss`, up to 4096, likewise. Of a disc 16, 32, 128: mean errors of 0.069, 0.060, 0.054; of `Pcss`
+    /// with as many to search 16, 32, and 128 with 64: 0.076, 0.054, 0.041, for a third, 1 and 3 times a cross's time.
     pub disc_taps: u32,
-    /// Rays to the lamp from each pixel, up to 4096. Error falls as their root.
+    /// Rays to the lamp from each pixel, up to 4096. 4, 16, 64: 0.139, 0.050, 0.018 for twice, 7 and 28 times a cross's time; accumulated
+    /// over frames they are exact.
     pub rays: u32,
     /// Widest radius of a penumbra in image space, pixels. Higher lets large lamps cast penumbrae as wide as they are, with more
     /// grain and fetches further apart; lower cuts them.
@@ -115,10 +118,9 @@ pub struct SoftShadowSettings {
 }
 
 impl Default for SoftShadowSettings {
-    /// "4 + 5" of the paper's Table 1: of the ways that cost as much none is off by less in all scenes of `docs/shadows.md`, and
-    /// where there is no penumbra it costs a fifth of `Pcss` of the same error. Grain goes by the number of taps and not by how far apart they
-    /// are, so that the widest radius only bounds how scattered fetches are; a quarter of a 512-pixel image leaves common
-    /// penumbrae alone. The error is the same for any range scale from 0.05 to 1; one in the middle.
+    /// "4 + 5" of the paper's Table 1. `docs/shadows.md` measures what other taps are worth. Grain goes by the number of taps and not by
+    /// how far apart they are, so that the widest radius only bounds how scattered fetches are; a quarter of a 512-pixel image
+    /// leaves common penumbrae alone. The error is the same for any range scale from 0.05 to 1; one in the middle.
     fn default() -> Self {
         Self {
             method: ShadowMethod::default(),
