@@ -373,7 +373,9 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::PHOTON_STREAM, "Params", photon_stream::gpu::Params {
             path_count, hop_count, first_path, pool_count, row, share,
         }),
-        twin!(wgsl::PHOTON_STREAM, "Impact", photon_pool::gpu::Impact { light, red, green, blue }),
+        twin!(wgsl::PHOTON_STREAM_PLACES, "Params", photon_stream::gpu::PlaceParams { slot_count, light_count, row }),
+        twin!(wgsl::PHOTON_STREAM_PLACES, "Nearest", surface_lights::gpu::Nearest { distance, slot }),
+        twin!(wgsl::PHOTON_STREAM, "Impact", photon_pool::gpu::Impact { light, red, green, blue, offset, pad }),
         twin!(wgsl::PHOTON_STREAM, "SurfaceLight", surface_lights::gpu::SurfaceLight { position, area, normal, pad }),
         twin!(wgsl::PHOTON_STREAM, "SurfaceLightGrid", surface_lights::gpu::SurfaceLightGrid {
             origin, cell, cells, count, steps, _pad,
@@ -502,6 +504,7 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "GlossyLight" => vec![&glossy_light::SLOTS],
         "EnvMapLighting" => vec![&env_map_lighting::SLOTS],
         "PhotonStream" => vec![&photon_stream::STREAM_SLOTS],
+        "PhotonStream places" => vec![&photon_stream::PLACE_SLOTS],
         "PhotonStream at impacts" => vec![&photon_stream::IMPACT_SLOTS],
         "SurfaceLightShading loop" | "SurfaceLightShading tiles" => vec![&surface_light_shading::SHADE_SLOTS],
         "SurfaceLightShading draw" => vec![&surface_light_shading::DRAW_SLOTS],

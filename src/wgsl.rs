@@ -395,6 +395,7 @@ pub(crate) const ENV_MAP_LIGHTING: &str = compose![
 
 pub(crate) const PHOTON_STREAM: &str = compose![
     "pass/photon_stream/stream_impacts.wgsl",
+    "pass/photon_stream/impact.wgsl",
     "pass/photon_stream/nearest_light.wgsl",
     "pass/photon_stream/params.wgsl",
     "common/surface_light.wgsl",
@@ -402,6 +403,12 @@ pub(crate) const PHOTON_STREAM: &str = compose![
     "common/octahedral.wgsl",
     "common/reflectance.wgsl",
     "common/hash.wgsl",
+];
+
+pub(crate) const PHOTON_STREAM_PLACES: &str = compose![
+    "pass/photon_stream/place_lights.wgsl",
+    "pass/photon_stream/impact.wgsl",
+    "common/surface_light.wgsl",
 ];
 
 pub(crate) const PHOTON_STREAM_AT_IMPACTS: &str = compose![
@@ -974,6 +981,7 @@ pub const MODULES: &[(&str, &str)] = &[
     ("GlossyLight", GLOSSY_LIGHT),
     ("EnvMapLighting", ENV_MAP_LIGHTING),
     ("PhotonStream", PHOTON_STREAM),
+    ("PhotonStream places", PHOTON_STREAM_PLACES),
     ("PhotonStream at impacts", PHOTON_STREAM_AT_IMPACTS),
     ("SurfaceLightShading loop", SURFACE_LIGHT_LOOP),
     ("SurfaceLightShading tiles", SURFACE_LIGHT_TILES),

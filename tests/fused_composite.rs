@@ -10,6 +10,9 @@ use lightfall::scene::{Light, LightKind, Scene, samples};
 
 const SIZE: [u32; 2] = [96, 64];
 
+/// Settings by name.
+type Overrides = &'static [(&'static str, &'static str)];
+
 fn settings(overrides: &[(&str, &str)]) -> Settings {
     let mut settings = Settings {
         photons: 5000,
@@ -68,7 +71,7 @@ fn one_pass_shows_what_one_after_the_other_shows() {
     if let LightKind::Point { radius, .. } = &mut hard.lights[0].kind {
         *radius = 0.0;
     }
-    let cases: [(&str, Scene, &[(&str, &str)]); 11] = [
+    let cases: [(&str, Scene, Overrides); 11] = [
         ("penumbra", penumbra.clone(), &[]),
         ("no extent", hard, &[]),
         ("no search", penumbra.clone(), &[("soft_shadow.search", "off")]),

@@ -66,11 +66,10 @@ impl<'a> Offline<'a> {
         renderer.set_environment(queue, scene.environment_image())?;
         renderer.set_scene(queue, &summary, &scene.lights)?;
         renderer.place_env_maps_blocking(queue, &mut geometry)?;
-        let takes_points = settings.indirect_method == IndirectMethod::SurfaceLights;
-        let count = settings.surface_lights.places as usize;
-        let points = takes_points
-            .then(|| SurfacePoint::place(&scene, count))
-            .unwrap_or_default();
+        let points = match settings.indirect_method {
+            IndirectMethod::SurfaceLights => SurfacePoint::place(&scene, settings.surface_lights.places as usize),
+            _ => Vec::new(),
+        };
         let weight = |on: bool| if on { 1.0 } else { 0.0 };
         let is_one_of =
             |components: &[Component]| weight(component == Component::All || components.contains(&component));

@@ -22,7 +22,8 @@ use super::surface_light_scene::SurfaceLightScene;
 use super::{IndirectMethod, LightPlacement, Plan, Settings, Stage};
 use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, CoverageMeasure, EnvMapSelector,
-    FusedCompositeInputs, GBufferCapture, GBufferCaptureInputs, PathShape, PhotonSplatter, PhotonSplatterResources,
+    FusedCompositeInputs, GBufferCapture, GBufferCaptureInputs, IndirectShadows, PathShape, PhotonSplatter,
+    PhotonSplatterResources,
 };
 #[cfg(feature = "bvh")]
 use crate::resource::BvhGeometry;
@@ -151,7 +152,7 @@ pub struct ViewInputs<'a> {
     pub queue: &'a wgpu::Queue,
     /// The geometry that was prepared.
     pub geometry: &'a dyn Geometry,
-    /// The same geometry as triangles, prepared for this frame: what rays of [`Stage::FinalGather`] and
+    /// The same geometry as triangles, prepared for this frame: what rays of [`Stage::FinalGather`], [`Stage::SurfaceLightShading`] and
     /// [`Stage::SpecularPaths`] meet where the settings trace triangles, and those of [`Stage::SoftShadow`] where they say so.
     #[cfg(feature = "bvh")]
     pub bvh: Option<&'a BvhGeometry>,
@@ -384,6 +385,9 @@ impl GiRenderer {
             self.revision += u64::from(env_maps.centers().is_empty());
             env_maps.forget_centers();
         }
+        if let Some(lights) = self.indirect.as_mut().and_then(IndirectScene::surface_lights_mut) {
+            lights.wake();
+        }
         self.apply_centers(queue)
     }
 
@@ -588,7 +592,7 @@ impl GiRenderer {
 
     /// Traces all of the photons that surface lights are made of, at once instead of over many frames: at the start, after a cut.
     /// Submits what it records and does not wait; call it after `prepare`, before `record_scene`. Nothing where there is no
-    /// pool.
+    /// pool, or threads of the processor fill it.
     ///
     /// # Errors
     /// As [`GiRenderer::record_scene`].
@@ -596,10 +600,15 @@ impl GiRenderer {
         #[cfg(feature = "bvh")]
         self.check_triangles(inputs)?;
         self.follow_places(inputs.queue)?;
+        #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
+        if self.photon_feeder.is_some() {
+            return Ok(());
+        }
         let per_round = self.settings.traced_photons().max(1);
         let rounds = self.photon_pool().map_or(0, PhotonPool::paths).div_ceil(per_round);
-        // As after a change: photons that rest are traced as well.
-        self.revision += 1;
+        if let Some(lights) = self.indirect.as_mut().and_then(IndirectScene::surface_lights_mut) {
+            lights.wake();
+        }
         for round in 0..rounds {
             let mut encoder = self.device.create_command_encoder(&Default::default());
             if round == 0 {
@@ -670,8 +679,12 @@ impl GiRenderer {
         let is_on = |stage| self.plan().is_some_and(|p| p.is_on(stage));
         let traces = self.settings.tracer_kind.uses_triangles();
         let shades = self.settings.soft_shadow.uses_triangles();
+        let lights_throw_shadows = self.settings.surface_lights.shading.shadows != IndirectShadows::Off;
         let (stage, remedy) = match () {
             () if traces && is_on(Stage::FinalGather) => ("FinalGather", NO_RAYS),
+            () if traces && lights_throw_shadows && is_on(Stage::SurfaceLightShading) => {
+                ("SurfaceLightShading", NO_RAYS)
+            }
             () if traces && is_on(Stage::SpecularPaths) => ("SpecularPaths", NO_RAYS),
             () if shades && is_on(Stage::SoftShadow) => ("SoftShadow", NO_SHADOW_RAYS),
             () => return Ok(()),
@@ -749,7 +762,7 @@ impl GiRenderer {
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] when a stage that the view needs for the first time does not fit; [`Error::MissingInput`] if
-    /// [`Stage::FinalGather`], [`Stage::SpecularPaths`] or [`Stage::SoftShadow`] is on, the settings trace triangles there, and none
+    /// [`Stage::FinalGather`], [`Stage::SurfaceLightShading`], [`Stage::SpecularPaths`] or [`Stage::SoftShadow`] is on, the settings trace triangles there, and none
     /// are given. Nothing is recorded then.
     pub fn record_view(
         &self,

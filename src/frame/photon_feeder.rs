@@ -1,8 +1,8 @@
 //! Photons that the processor traces in threads of its own while the GPU draws (photon streaming with virtual surface
 //! lights, section 0.7.2).
 //!
-//! The thread that renders hands over a scene when it has changed and takes what is there when it is there: it never waits and
-//! takes no lock. Limits: bulbs, spots and suns have no extent; metal reflects like a mirror and glass ends a path; textures
+//! The thread that renders hands over a scene when it has changed and takes what is there when it is there: it never waits, and no thread
+//! waits in a channel for it. Limits: bulbs, spots and suns have no extent; metal reflects like a mirror and glass ends a path; textures
 //! are looked up without filtering, cut-outs are whole.
 
 use crate::halton::radical_inverse;
@@ -16,12 +16,15 @@ use obvhs::triangle::Triangle;
 use std::f32::consts::TAU;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
+use std::sync::mpsc::{self, Receiver, Sender, SyncSender, TrySendError};
 use std::thread::{self, JoinHandle};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Batches that wait to be taken.
 const WAITING: usize = 2;
+
+/// Between looks whether one was taken.
+const PAUSE: Duration = Duration::from_micros(500);
 
 /// Suns that stand for an environment.
 const SUNS: usize = 24;
@@ -33,8 +36,10 @@ const OFF_SURFACE: f32 = 1.0 / (1 << 14) as f32;
 #[derive(Debug)]
 pub struct PhotonFeeder {
     scenes: Sender<Snapshot>,
+    /// Scenes handed over so far.
+    newest: AtomicU64,
     /// `None` while it is dropped.
-    batches: Option<Receiver<Vec<Photon>>>,
+    batches: Option<Receiver<Batch>>,
     coordinator: Option<JoinHandle<()>>,
     counts: Arc<Counts>,
     paths: u32,
@@ -48,8 +53,12 @@ struct Counts {
     nanoseconds: AtomicU64,
 }
 
-/// A scene as it was handed over.
+/// Photons in the order that [`Photons`] has, and the number of their scene.
+type Batch = (u64, Vec<Photon>);
+
+/// A scene as it was handed over, and its number.
 struct Snapshot {
+    number: u64,
     frame: UnitFrame,
     scene: Arc<Scene>,
 }
@@ -71,6 +80,7 @@ impl PhotonFeeder {
         };
         Self {
             scenes,
+            newest: AtomicU64::new(0),
             batches: Some(batches),
             coordinator: Some(thread::spawn(move || own.run())),
             counts,
@@ -79,9 +89,11 @@ impl PhotonFeeder {
         }
     }
 
-    /// Says what the scene is from now on, and the unit frame that photons are wanted in. Batches that are under way are still of the scene before.
+    /// Says what the scene is from now on, and the unit frame that photons are wanted in. Batches of scenes before are not taken
+    /// any more.
     pub fn set_scene(&self, frame: &UnitFrame, scene: &Arc<Scene>) {
         let snapshot = Snapshot {
+            number: self.newest.fetch_add(1, Ordering::Relaxed) + 1,
             frame: *frame,
             scene: Arc::clone(scene),
         };
@@ -93,13 +105,13 @@ impl PhotonFeeder {
     /// and returns false. Does not wait.
     pub fn upload(&self, queue: &wgpu::Queue, photons: &Photons) -> bool {
         let fits = photons.count() == self.paths && photons.bounces() == self.bounces;
-        match self.batches.as_ref().filter(|_| fits).map(Receiver::try_recv) {
-            Some(Ok(batch)) => {
-                queue.write_buffer(photons.buffer(), 0, bytemuck::cast_slice(&batch));
-                true
-            }
-            _ => false,
-        }
+        let newest = self.newest.load(Ordering::Relaxed);
+        let batches = self.batches.iter().filter(|_| fits).flat_map(Receiver::try_iter);
+        let Some((_, batch)) = batches.into_iter().find(|(number, _)| *number == newest) else {
+            return false;
+        };
+        queue.write_buffer(photons.buffer(), 0, bytemuck::cast_slice(&batch));
+        true
     }
 
     /// Impacts that a second of tracing brought so far, by all threads together.
@@ -110,7 +122,7 @@ impl PhotonFeeder {
 }
 
 impl Drop for PhotonFeeder {
-    /// Stops the threads and waits for them: no longer than a batch takes.
+    /// Stops the threads and waits for them: no longer than a batch, or the tree of a scene, takes.
     fn drop(&mut self) {
         self.batches = None;
         // An end of scenes as well, in case none has come yet.
@@ -122,10 +134,17 @@ impl Drop for PhotonFeeder {
     }
 }
 
+/// What follows a batch.
+enum Next {
+    Batch,
+    Scene(Snapshot),
+    End,
+}
+
 /// The thread that divides the work.
 struct Coordinator {
     new_scenes: Receiver<Snapshot>,
-    finished: SyncSender<Vec<Photon>>,
+    finished: SyncSender<Batch>,
     counts: Arc<Counts>,
     paths: u32,
     bounces: u32,
@@ -136,22 +155,41 @@ impl Coordinator {
     /// Until nobody wants batches any more.
     fn run(self) {
         let mut first = 0u32;
-        let Ok(snapshot) = self.new_scenes.recv() else { return };
+        let Ok(mut snapshot) = self.new_scenes.recv() else {
+            return;
+        };
         let mut world = World::new(&snapshot);
         loop {
-            if let Some(snapshot) = self.new_scenes.try_iter().last() {
-                world = World::new(&snapshot);
-            }
             let start = Instant::now();
-            let batch = self.trace(&world, first);
-            let impacts = batch.iter().filter(|p| p.state & 3 == 1).count();
+            let photons = self.trace(&world, first);
+            let impacts = photons.iter().filter(|p| p.state & 3 == 1).count();
             self.counts.impacts.fetch_add(impacts as u64, Ordering::Relaxed);
             let nanoseconds = start.elapsed().as_nanos() as u64;
             self.counts.nanoseconds.fetch_add(nanoseconds, Ordering::Relaxed);
             first = first.wrapping_add(self.paths);
-            if self.finished.send(batch).is_err() {
-                return;
+            match self.hand_over((snapshot.number, photons)) {
+                Next::Batch => {}
+                Next::Scene(newer) => {
+                    snapshot = newer;
+                    world = World::new(&snapshot);
+                }
+                Next::End => return,
             }
+        }
+    }
+
+    /// Waits until there is room for a batch, or it is of no use.
+    fn hand_over(&self, mut batch: Batch) -> Next {
+        loop {
+            if let Some(snapshot) = self.new_scenes.try_iter().last() {
+                return Next::Scene(snapshot);
+            }
+            batch = match self.finished.try_send(batch) {
+                Ok(()) => return Next::Batch,
+                Err(TrySendError::Full(batch)) => batch,
+                Err(TrySendError::Disconnected(_)) => return Next::End,
+            };
+            thread::sleep(PAUSE);
         }
     }
 
@@ -274,7 +312,8 @@ impl World {
         let (mut origin, mut direction) = kind.start(&mut random, self.radius);
         for (hop, photon) in photons.iter_mut().enumerate() {
             let Some(hit) = self.hit(origin, direction) else { break };
-            let lobe = u32::from(hit.is_metal) << 2;
+            // Not diffuse, in one way or another.
+            let lobe = u32::from(hit.is_metal || hit.is_glass) << 2;
             *photon = Photon {
                 position: hit.position.to_array(),
                 state: 1 | lobe | if hop == 0 { Photon::FIRST_HIT } else { 0 },
@@ -546,6 +585,7 @@ mod tests {
         let summary = SceneSummary::of(&scene).unwrap();
         let frame = UnitFrame::new(&summary.bounds, summary.total_flux).unwrap();
         World::new(&Snapshot {
+            number: 1,
             frame,
             scene: Arc::new(scene),
         })

@@ -405,6 +405,12 @@ fn simplifications(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
             list(&specular)
         ));
     }
+    if settings.indirect_method == IndirectMethod::SurfaceLights && !specular.is_empty() {
+        notes.push(format!(
+            "seen in {}: light of this frame's photons, with one bounce less",
+            list(&specular)
+        ));
+    }
     if settings.indirect_method == IndirectMethod::FinalGather && !specular.is_empty() {
         notes.push(format!("gathered light does not come by way of {}", list(&specular)));
     }

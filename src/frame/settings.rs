@@ -173,7 +173,8 @@ pub enum GlossyMethod {
 pub struct Settings {
     /// Frames to accumulate for one image: noise falls as their number grows. 1 in real time.
     pub frames: u32,
-    /// Photons emitted a frame. Cost grows in proportion; noise falls as the square root.
+    /// Photons emitted a frame. Cost grows in proportion; noise falls as the square root. Of surface lights
+    /// [`SurfaceLightSettings::stream`] says how many.
     pub photons: u32,
     /// Share of the photons, from 0 and below 1, that go in those directions, from their light and from diffuse surfaces, whose paths
     /// were seen in the frames before; the others are spread evenly. Pays where much of the light never comes before the eye, as

@@ -22,6 +22,8 @@ pub(super) struct SurfaceLightScene {
     sample_offset: u32,
     /// Paths until all are of this revision.
     left: u32,
+    /// Whether a light did, this frame.
+    has_moved: bool,
 }
 
 impl SurfaceLightScene {
@@ -41,6 +43,7 @@ impl SurfaceLightScene {
             frame: None,
             revision: 0,
             sample_offset: 0,
+            has_moved: false,
         })
     }
 
@@ -58,7 +61,7 @@ impl SurfaceLightScene {
         if places.len() as u32 * 2 > self.lights.capacity() {
             self.lights = SurfaceLights::new(device, places.len() as u32, pool.hops())?;
         }
-        self.lights.write(queue, frame, places)?;
+        self.has_moved = self.lights.write(queue, frame, places)?;
         // Of other lights, or of another frame, the pool knows nothing.
         if self.lights.count() != before || !self.frame.as_ref().is_some_and(|f| f.maps_like(frame)) {
             pool.restart();
@@ -66,6 +69,11 @@ impl SurfaceLightScene {
         }
         self.frame = Some(*frame);
         Ok(())
+    }
+
+    /// Has all paths traced anew, as after a change.
+    pub(super) fn wake(&mut self) {
+        self.left = self.pool.as_ref().map_or(0, PhotonPool::paths);
     }
 
     /// Where in the random sequence the next photons begin; `None` while nothing has changed since all paths were traced: then
@@ -94,16 +102,12 @@ impl SurfaceLightScene {
         traced: &mut TracedPhotons,
         mut inputs: WalkInputs<'_>,
     ) -> Result<(), Error> {
-        let (Some(first), Some(pass)) = (
-            self.begin(inputs.photons.revision, inputs.sample_offset),
-            &passes.photon_stream,
-        ) else {
+        let Some(pass) = &passes.photon_stream else {
             return Ok(());
         };
-        inputs.sample_offset = first;
-        if !bring_photons(encoder, passes, traced, &inputs)? {
-            return Ok(());
-        }
+        let first = self.begin(inputs.photons.revision, inputs.sample_offset);
+        inputs.sample_offset = first.unwrap_or(0);
+        let is_new = first.is_some() && bring_photons(encoder, passes, traced, &inputs)?;
         let (queue, timestamps) = (inputs.photons.scene.queue, inputs.photons.scene.timestamps);
         let (photons, lights) = (&traced.photons, &mut self.lights);
         let Some(pool) = &mut self.pool else {
@@ -115,7 +119,6 @@ impl SurfaceLightScene {
             };
             return pass.record_at_impacts(encoder, &mut self.own, &mut inputs);
         };
-        self.left = self.left.saturating_sub(photons.count());
         let mut inputs = PhotonStreamInputs {
             queue,
             photons,
@@ -123,7 +126,13 @@ impl SurfaceLightScene {
             lights,
             timestamps,
         };
-        pass.record(encoder, &mut self.own, &mut inputs)
+        if is_new {
+            self.left = self.left.saturating_sub(photons.count());
+            pass.record(encoder, &mut self.own, &mut inputs)?;
+        } else if self.has_moved {
+            pass.record_places(encoder, &mut self.own, &inputs);
+        }
+        Ok(())
     }
 
     pub(super) fn lights(&self) -> &SurfaceLights {

@@ -4,9 +4,10 @@
 //! surface lights, section 0.5 and Algorithm 2, with changes: an impact counts the flux that its surface sends *on*; the pool
 //! holds whole paths, each of the flux that one of as many emitted at once has, so that its energy is the lights'; fluxes are
 //! whole numbers, so that sums never drift, rounded by chance that belongs to the place in the pool.
-//! [`PhotonStream::record_at_impacts`] is instant radiosity (Keller 1997), the paper's baseline.
+//! A light shines from where that of its impacts arrived that is nearest to its place: places may be hidden, and what no light reaches
+//! should not shine (`docs/surface_lights.md`). [`PhotonStream::record_at_impacts`] is instant radiosity (Keller 1997), the paper's baseline.
 //!
-//! Cost: impacts of the new paths; of each, the cells of the grid around it up to the nearest light. Limits: diffuse surfaces alone send light on
+//! Cost: impacts of the new paths; of each, the cells of the grid around it up to the nearest light; two looks at each impact of the pool. Limits: diffuse surfaces alone send light on
 //! here; what glossy ones reflect is photons' matter.
 
 use super::dispatch_64;
@@ -28,6 +29,15 @@ pub(crate) mod gpu {
         pub(crate) row: u32,
         pub(crate) share: f32,
     }
+
+    /// Twin of `Params` in `shaders/pass/photon_stream/place_lights.wgsl`.
+    #[derive(Clone, Copy, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct PlaceParams {
+        pub(crate) slot_count: u32,
+        pub(crate) light_count: u32,
+        pub(crate) row: u32,
+    }
 }
 
 /// Bindings of `shaders/pass/photon_stream/stream_impacts.wgsl`, in order.
@@ -35,6 +45,15 @@ pub(crate) const STREAM_SLOTS: [Slot; 7] = [
     Slot::Uniform,
     Slot::Uniform,
     Slot::Storage,
+    Slot::Storage,
+    Slot::Storage,
+    Slot::StorageMut,
+    Slot::StorageMut,
+];
+
+/// Bindings of `shaders/pass/photon_stream/place_lights.wgsl`, in order.
+pub(crate) const PLACE_SLOTS: [Slot; 5] = [
+    Slot::Uniform,
     Slot::Storage,
     Slot::Storage,
     Slot::StorageMut,
@@ -57,6 +76,9 @@ pub struct PhotonStream {
     stream_layout: wgpu::BindGroupLayout,
     impact_layout: wgpu::BindGroupLayout,
     stream: wgpu::ComputePipeline,
+    place_layout: wgpu::BindGroupLayout,
+    /// Of each light the nearest impact: how far, which, and so where.
+    places: [wgpu::ComputePipeline; 3],
     at_impacts: wgpu::ComputePipeline,
 }
 
@@ -64,6 +86,8 @@ pub struct PhotonStream {
 #[derive(Debug)]
 pub struct PhotonStreamResources {
     params: wgpu::Buffer,
+    place_params: wgpu::Buffer,
+    place_groups: BindGroupCache,
     stream_groups: BindGroupCache,
     impact_groups: BindGroupCache,
 }
@@ -73,7 +97,7 @@ pub struct PhotonStreamResources {
 pub struct PhotonStreamInputs<'a> {
     /// For the uniforms of this frame.
     pub queue: &'a wgpu::Queue,
-    /// The new paths, traced: no more than the pool holds, of no more hops. Emitted from [`PhotonPool::next`] of the random
+    /// The new paths, traced: no more than the pool holds, of as many hops. Emitted from [`PhotonPool::next`] of the random
     /// sequence on, and as if there were no others.
     pub photons: &'a Photons,
     /// The others.
@@ -103,6 +127,7 @@ impl PhotonStream {
         let stage = wgpu::ShaderStages::COMPUTE;
         let stream_layout = device::layout(device, "lightfall::PhotonStream", stage, &STREAM_SLOTS);
         let impact_layout = device::layout(device, "lightfall::PhotonStream::impacts", stage, &IMPACT_SLOTS);
+        let place_layout = device::layout(device, "lightfall::PhotonStream::places", stage, &PLACE_SLOTS);
         let pipeline = |label, source, entry_point, layout| {
             let spec = ComputeSpec {
                 label,
@@ -113,6 +138,10 @@ impl PhotonStream {
             };
             device::compute_pipeline(device, &spec)
         };
+        let places = ["find_distances", "find_slots", "place_lights"].map(|entry_point| {
+            let source = wgsl::PHOTON_STREAM_PLACES;
+            pipeline("lightfall::PhotonStream::places", source, entry_point, &place_layout)
+        });
         Self {
             device: device.clone(),
             stream: pipeline(
@@ -121,6 +150,7 @@ impl PhotonStream {
                 "stream_impacts",
                 &stream_layout,
             ),
+            places,
             at_impacts: pipeline(
                 "lightfall::PhotonStream::impacts",
                 wgsl::PHOTON_STREAM_AT_IMPACTS,
@@ -128,6 +158,7 @@ impl PhotonStream {
                 &impact_layout,
             ),
             stream_layout,
+            place_layout,
             impact_layout,
         }
     }
@@ -135,7 +166,7 @@ impl PhotonStream {
     /// Records the exchange of the oldest paths for the new ones.
     ///
     /// # Errors
-    /// [`Error::CountMismatch`] for more paths, or more hops, than the pool holds; nothing is recorded then.
+    /// [`Error::CountMismatch`] for more paths than the pool holds, or of another number of hops; nothing is recorded then.
     pub fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -143,19 +174,22 @@ impl PhotonStream {
         inputs: &mut PhotonStreamInputs<'_>,
     ) -> Result<(), Error> {
         let (photons, pool) = (inputs.photons, &mut *inputs.pool);
-        for (what, expected, found) in [
+        let (paths, hops) = (photons.count(), photons.bounces() + 1);
+        for (what, expected, found, is_bad) in [
             (
                 "photons to stream (most that the pool holds)",
                 pool.paths(),
-                photons.count(),
+                paths,
+                paths > pool.paths(),
             ),
             (
-                "hops of photons to stream (most that the pool holds)",
+                "hops of photons to stream (as many as the pool has)",
                 pool.hops(),
-                photons.bounces() + 1,
+                hops,
+                hops != pool.hops(),
             ),
         ] {
-            if found > expected {
+            if is_bad {
                 let (expected, found) = (expected as usize, found as usize);
                 return Err(Error::CountMismatch { what, expected, found });
             }
@@ -197,7 +231,50 @@ impl PhotonStream {
         pass.set_pipeline(&self.stream);
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(groups[0], groups[1], 1);
+        drop(pass);
+        self.record_places(encoder, resources, inputs);
         Ok(())
+    }
+
+    /// Records from where lights shine, as `record` does at its end: for frames in which lights moved and no photons are
+    /// streamed.
+    pub fn record_places(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut PhotonStreamResources,
+        inputs: &PhotonStreamInputs<'_>,
+    ) {
+        let slots = inputs.pool.paths() * inputs.pool.hops();
+        let (groups, row) = dispatch_64(slots);
+        let params = gpu::PlaceParams {
+            slot_count: slots,
+            light_count: inputs.lights.count(),
+            row,
+        };
+        inputs
+            .queue
+            .write_buffer(&resources.place_params, 0, bytemuck::bytes_of(&params));
+        encoder.clear_buffer(inputs.lights.nearest(), 0, None);
+        let bound = [
+            (&resources.place_params).into(),
+            inputs.pool.buffer().into(),
+            inputs.lights.records().into(),
+            inputs.lights.nearest().into(),
+            inputs.lights.shining().into(),
+        ];
+        let label = "lightfall::PhotonStream::places";
+        let group = resources
+            .place_groups
+            .get(&self.device, label, &self.place_layout, &bound);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_bind_group(0, &group, &[]);
+        let [distances, slots, places] = &self.places;
+        for pipeline in [distances, slots] {
+            pass.set_pipeline(pipeline);
+            pass.dispatch_workgroups(groups[0], groups[1], 1);
+        }
+        pass.set_pipeline(places);
+        pass.dispatch_workgroups(inputs.lights.count().div_ceil(64), 1, 1);
     }
 
     /// Records a light at each impact.
@@ -235,7 +312,7 @@ impl PhotonStream {
             (&resources.params).into(),
             inputs.lights.grid().into(),
             photons.buffer().into(),
-            inputs.lights.records().into(),
+            inputs.lights.shining().into(),
             inputs.lights.flux().into(),
         ];
         let label = "lightfall::PhotonStream::impacts";
@@ -258,6 +335,8 @@ impl PhotonStreamResources {
     pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
         Ok(Self {
             params: device::uniform_buffer::<gpu::Params>(device, "lightfall::PhotonStream::params")?,
+            place_params: device::uniform_buffer::<gpu::PlaceParams>(device, "lightfall::PhotonStream::place_params")?,
+            place_groups: BindGroupCache::default(),
             stream_groups: BindGroupCache::default(),
             impact_groups: BindGroupCache::default(),
         })
@@ -265,6 +344,6 @@ impl PhotonStreamResources {
 
     /// Bytes allocated.
     pub fn memory_use(&self) -> u64 {
-        self.params.size()
+        self.params.size() + self.place_params.size()
     }
 }

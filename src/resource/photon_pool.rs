@@ -5,19 +5,21 @@ use crate::{Error, gpu as device};
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
-    /// Twin of `Impact` in `shaders/pass/photon_stream/stream_impacts.wgsl`.
-    #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+    /// Twin of `Impact` in `shaders/pass/photon_stream/impact.wgsl`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
     #[repr(C)]
     pub(crate) struct Impact {
         pub(crate) light: u32,
         pub(crate) red: u32,
         pub(crate) green: u32,
         pub(crate) blue: u32,
+        pub(crate) offset: [f32; 3],
+        pub(crate) pad: u32,
     }
 }
 
-/// Paths that are replaced one after the other, the oldest first: of each impact the light that it counts for, and what it counts there, in
-/// whole steps; a storage buffer of 16 bytes an impact, `hop` × paths + `path` in order. Emptied where lights are other ones
+/// Paths that are replaced one after the other, the oldest first: of each impact the light that it counts for, what it counts there, in
+/// whole steps, and where it arrived, from the light's place; a storage buffer of 32 bytes an impact, `hop` × paths + `path` in order. Emptied where lights are other ones
 /// ([`PhotonPool::restart`]).
 #[derive(Debug)]
 pub struct PhotonPool {

@@ -4,7 +4,7 @@ use crate::scene::{SurfacePlace, UnitFrame};
 use crate::{Error, gpu as device};
 use glam::{UVec3, Vec3};
 
-/// Most lights of a grid of cells along an axis: cells are as wide as lights lie apart, or as this many cover them.
+/// Most cells along an axis: they are as wide as lights lie apart, or as this many cover all lights.
 const MOST_CELLS: u32 = 32;
 
 pub(crate) mod gpu {
@@ -20,6 +20,14 @@ pub(crate) mod gpu {
         pub(crate) pad: u32,
     }
 
+    /// Twin of `Nearest` in `shaders/pass/photon_stream/place_lights.wgsl`.
+    #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+    #[repr(C)]
+    pub(crate) struct Nearest {
+        pub(crate) distance: u32,
+        pub(crate) slot: u32,
+    }
+
     /// Twin of `SurfaceLightGrid` in `shaders/common/surface_light.wgsl`.
     #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
     #[repr(C)]
@@ -33,13 +41,17 @@ pub(crate) mod gpu {
     }
 }
 
-/// Lights on surfaces, two at each place, one for either side: light 2 i on the side that its normal points to. Two storage
-/// buffers: 32 bytes a light (position, area, normal, 0; unit frame), and its flux, red, green and blue as whole numbers of
+/// Lights on surfaces, two at each place, one for either side: light 2 i on the side that its normal points to. Storage
+/// buffers: 32 bytes a light (position, area, normal, 0; unit frame), where it stands and where it shines from, and its flux, red, green and blue as whole numbers of
 /// [`SurfaceLights::flux_of_step`], with the number of photons that it is of. Filled by
 /// [`PhotonStream`](crate::pass::PhotonStream), shone by [`SurfaceLightShading`](crate::pass::SurfaceLightShading).
 #[derive(Debug)]
 pub struct SurfaceLights {
+    /// Where they stand.
     records: wgpu::Buffer,
+    /// From where they shine.
+    shining: wgpu::Buffer,
+    nearest: wgpu::Buffer,
     flux: wgpu::Buffer,
     cells: wgpu::Buffer,
     grid: wgpu::Buffer,
@@ -54,7 +66,7 @@ impl SurfaceLights {
     /// Bytes for so many places.
     pub fn size_in_bytes(places: u32) -> u64 {
         let lights = u64::from(lights_of(places));
-        lights * (size_of::<gpu::SurfaceLight>() as u64 + 16)
+        lights * (2 * size_of::<gpu::SurfaceLight>() as u64 + size_of::<gpu::Nearest>() as u64 + 16)
             + cells_bytes(places)
             + size_of::<gpu::SurfaceLightGrid>() as u64
     }
@@ -71,6 +83,11 @@ impl SurfaceLights {
         let storage = |label, bytes| device::buffer(device, label, bytes, B::STORAGE | B::COPY_DST | B::COPY_SRC);
         Ok(Self {
             records: storage("lightfall::SurfaceLights::records", records)?,
+            shining: storage("lightfall::SurfaceLights::shining", records)?,
+            nearest: storage(
+                "lightfall::SurfaceLights::nearest",
+                lights * size_of::<gpu::Nearest>() as u64,
+            )?,
             flux: storage("lightfall::SurfaceLights::flux", 16 * lights)?,
             cells: storage("lightfall::SurfaceLights::cells", cells_bytes(places))?,
             grid: device::uniform_buffer::<gpu::SurfaceLightGrid>(device, "lightfall::SurfaceLights::grid")?,
@@ -86,7 +103,9 @@ impl SurfaceLights {
     ///
     /// # Errors
     /// [`Error::CountMismatch`] for more places than there is room for; [`Error::InvalidScene`] for one that is not finite.
-    pub fn write(&mut self, queue: &wgpu::Queue, frame: &UnitFrame, places: &[SurfacePlace]) -> Result<(), Error> {
+    ///
+    /// Returns whether any moved: then they shine from their places until [`PhotonStream`](crate::pass::PhotonStream) is recorded.
+    pub fn write(&mut self, queue: &wgpu::Queue, frame: &UnitFrame, places: &[SurfacePlace]) -> Result<bool, Error> {
         if lights_of(places.len() as u32) > self.capacity {
             return Err(Error::CountMismatch {
                 what: "places of surface lights (most that there is room for)",
@@ -112,15 +131,17 @@ impl SurfaceLights {
         };
         let records: Vec<_> = places.iter().flat_map(sides).collect();
         if records == self.written {
-            return Ok(());
+            return Ok(false);
         }
         let (grid, cells) = cells_of(&records, self.steps);
-        queue.write_buffer(&self.records, 0, bytemuck::cast_slice(&records));
+        for buffer in [&self.records, &self.shining] {
+            queue.write_buffer(buffer, 0, bytemuck::cast_slice(&records));
+        }
         queue.write_buffer(&self.cells, 0, bytemuck::cast_slice(&cells));
         queue.write_buffer(&self.grid, 0, bytemuck::bytes_of(&grid));
         self.count = records.len() as u32;
         self.written = records;
-        Ok(())
+        Ok(true)
     }
 
     /// Says that so many lights stand where photons arrive, and not at places of their own.
@@ -139,9 +160,19 @@ impl SurfaceLights {
         encoder.clear_buffer(&self.flux, 0, None);
     }
 
-    /// Of the lights, 32 bytes each.
+    /// Where the lights stand, 32 bytes each.
     pub fn records(&self) -> &wgpu::Buffer {
         &self.records
+    }
+
+    /// The same, but with the position that they shine from: that of their impact that is nearest to their place, or the place until
+    /// there is one.
+    pub fn shining(&self) -> &wgpu::Buffer {
+        &self.shining
+    }
+
+    pub(crate) fn nearest(&self) -> &wgpu::Buffer {
+        &self.nearest
     }
 
     /// Of the lights, 16 bytes each: red, green, blue, photons.
@@ -174,7 +205,12 @@ impl SurfaceLights {
 
     /// Bytes this resource allocated.
     pub fn memory_use(&self) -> u64 {
-        self.records.size() + self.flux.size() + self.cells.size() + self.grid.size()
+        self.records.size()
+            + self.shining.size()
+            + self.nearest.size()
+            + self.flux.size()
+            + self.cells.size()
+            + self.grid.size()
     }
 }
 

@@ -11,6 +11,9 @@ const SHRUNK: f64 = 0.9;
 /// as darts of the same number; with three times as many, 0.8 of it; five times gain a hundredth more.
 const TOO_MANY: f64 = 3.0;
 
+/// No more than so many, and the paper's tenth: time grows as the square.
+const MOST_TOO_MANY: usize = 3000;
+
 /// A point of a surface, fixed to its instance, and how much surface it stands for. Placed once; moves with the instance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfacePoint {
@@ -31,7 +34,7 @@ impl SurfacePoint {
     ///
     /// Source: photon streaming with virtual surface lights, section 0.4.2 and Algorithm 1: points are placed in shrunk triangles by
     /// area, too many, and of the two that lie closest the one whose second neighbour is closer goes, until `count` are
-    /// left. Changes: four times too many instead of a tenth; places come from the Halton sequence instead of at random; points that face apart, as on both sides of a wall, are no
+    /// left. Changes: four times as many instead of a tenth more, up to 3000; places come from the Halton sequence instead of at random; points that face apart, as on both sides of a wall, are no
     /// neighbours; the last point of an instance stays.
     pub fn place(scene: &Scene, count: usize) -> Vec<Self> {
         let sampled: Vec<_> = scene
@@ -39,7 +42,7 @@ impl SurfacePoint {
             .iter()
             .map(|i| SampledInstance::new(&scene.meshes[i.mesh], i))
             .collect();
-        let most = count + (TOO_MANY * count as f64).ceil() as usize;
+        let most = count + ((TOO_MANY * count as f64) as usize).min(MOST_TOO_MANY + count / 10);
         let mut placed = Vec::new();
         for (instance, number) in quotas(&sampled, most).into_iter().enumerate() {
             let sampled = &sampled[instance];

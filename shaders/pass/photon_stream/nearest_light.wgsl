@@ -1,9 +1,12 @@
-// The light that an impact belongs to. The module brings `lights`, `grid` and `cells`: of each cell the first of its entries, and one more;
+// The light that an impact belongs to: the nearest one that faces the same way, by a distance that counts off the impact's plane more than along
+// it. The module brings `lights`, `grid` and `cells`: of each cell the first of its entries, and one more;
 // behind them the entries, indices of lights.
 
 const NO_LIGHT: u32 = 0xffffffffu;
 // Cosine of the largest angle between the normals of an impact and of its light, if there is a light within it.
 const SAME_WAY: f32 = 0.5;
+// How much more a distance off the plane of an impact counts than one along it, squared.
+const OFF_PLANE: f32 = 30.0;
 
 struct Nearest {
     light: u32,
@@ -18,7 +21,8 @@ fn nearest_in_cell(found: Nearest, cell: vec3u, p: vec3f, n: vec3f) -> Nearest {
     for (var i = cells[index]; i < cells[index + 1u]; i++) {
         let light = cells[entries + i];
         let away = lights[light].position - p;
-        let distance_squared = dot(away, away);
+        let off_plane = dot(away, n);
+        let distance_squared = dot(away, away) + OFF_PLANE * off_plane * off_plane;
         if distance_squared < nearest.distance_squared && dot(lights[light].normal, n) >= SAME_WAY {
             nearest = Nearest(light, distance_squared);
         }

@@ -2,14 +2,6 @@
 // lights nearest to where they arrived. One invocation an impact. All of it is whole numbers, so that a light holds the sum of the impacts that point to it,
 // exactly and for good.
 
-// What the pool knows of an impact.
-struct Impact {
-    light: u32,
-    red: u32,
-    green: u32,
-    blue: u32,
-}
-
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> grid: SurfaceLightGrid;
 @group(0) @binding(2) var<storage, read> photons: array<Photon>;
@@ -28,7 +20,7 @@ fn stream_impacts(@builtin(global_invocation_id) id: vec3u) {
     let path = (params.first_path + index % params.path_count) % params.pool_count;
     let slot = (index / params.path_count) * params.pool_count + path;
     let old = pool[slot];
-    if (old.red | old.green | old.blue) != 0u {
+    if impact_counts(old) {
         atomicSub(&flux[old.light][0], old.red);
         atomicSub(&flux[old.light][1], old.green);
         atomicSub(&flux[old.light][2], old.blue);
@@ -41,10 +33,10 @@ fn stream_impacts(@builtin(global_invocation_id) id: vec3u) {
         light = nearest_light(photon.position, octahedral_unpack(photon.normal));
     }
     if light == NO_LIGHT {
-        pool[slot] = Impact(0u, 0u, 0u, 0u);
+        pool[slot] = Impact();
         return;
     }
-    pool[slot] = Impact(light, sent_on.x, sent_on.y, sent_on.z);
+    pool[slot] = Impact(light, sent_on.x, sent_on.y, sent_on.z, photon.position - lights[light].position, 0u);
     atomicAdd(&flux[light][0], sent_on.x);
     atomicAdd(&flux[light][1], sent_on.y);
     atomicAdd(&flux[light][2], sent_on.z);

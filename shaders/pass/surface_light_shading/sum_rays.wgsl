@@ -70,7 +70,10 @@ fn sum_rays(@builtin(global_invocation_id) id: vec3u) {
     let receiver = receiver_at(subsampling_pixel(pixel, params.factor, view.size));
     let first = params.ray_count * (id.y * width + id.x);
     var sum = vec3f(0.0);
-    if receiver.is_seen && params.shadows == SHADOWS_AMBIENT {
+    if params.ray_count == 0u {
+        // Room for none.
+        sum = unshadowed(receiver);
+    } else if receiver.is_seen && params.shadows == SHADOWS_AMBIENT {
         var open = 0.0;
         for (var ray = 0u; ray < params.ray_count; ray++) {
             open += select(1.0, 0.0, is_blocked(first + ray, params.reach));

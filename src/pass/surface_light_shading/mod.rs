@@ -83,7 +83,7 @@ pub enum LightForm {
     /// All lights at every pixel.
     Loop,
     /// Of each light the rectangle around its ball of influence, drawn and blended: into `rgba32float` where the device has
-    /// `FLOAT32_BLENDABLE`, else into `rgba16float`, which loses digits.
+    /// `FLOAT32_BLENDABLE`, else into `rgba16float`, which loses digits. Alpha is 0 everywhere.
     Drawn,
     /// At every pixel the lights that reach its tile of 8 × 8.
     #[default]
@@ -100,7 +100,7 @@ pub enum IndirectShadows {
     /// Rays to a few lights, picked by how much they give: right in the mean, with noise.
     #[default]
     Some = 2,
-    /// A ray to each light.
+    /// A ray to each light that gives more than the threshold; those that give less throw no shadows.
     All = 3,
 }
 
@@ -188,8 +188,9 @@ pub struct SurfaceLightShadingInputs<'a> {
 /// A band of a view's rays.
 #[derive(Debug, Clone, Copy)]
 pub struct SurfaceLightRays<'a> {
-    /// Room for the rays of the band's pixels. The first step writes them, a tracer says what they meet, the second step reads
-    /// that. What is left over is not written.
+    /// Room for the rays of the band's pixels, [`SurfaceLightShading::rays_a_pixel`] each; where there is less room pixels have fewer, or
+    /// no shadows. The first step writes them, a tracer says what they meet, the second step reads that. What is left over is not
+    /// written.
     pub rays: &'a SurfaceRays,
     /// Which rows of the irradiance, as first row and number. Each band of a submission needs resources of its own.
     pub rows: [u32; 2],
@@ -412,7 +413,7 @@ fn shared_bindings(
         (&views.normal).into(),
         (&views.base_color).into(),
         inputs.g_buffer.surfaces().into(),
-        inputs.lights.records().into(),
+        inputs.lights.shining().into(),
         inputs.lights.flux().into(),
     ]
 }
