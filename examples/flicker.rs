@@ -55,8 +55,8 @@ struct Arguments {
     /// fast, balanced, accurate; frames are not accumulated
     #[arg(long, default_value = "balanced")]
     preset: String,
-    /// How photons find what they hit: image-space, hybrid, bvh; with :METHOD behind it, as in bvh:surface-lights, how light comes to
-    /// pixels
+    /// How photons find what they hit: image-space, hybrid, bvh; with :METHOD behind it, as in bvh:surface-lights, how light
+    /// comes to pixels
     #[arg(long, value_delimiter = ',', default_values = TRACERS)]
     tracers: Vec<String>,
     /// Any field of Settings but frames and tracer.kind, repeatable; an unknown key lists them all

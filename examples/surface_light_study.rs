@@ -5,8 +5,8 @@
 //! ```
 //!
 //! Times are of the shading alone, at every pixel and without shadows, on the wall: medians of rounds in which each form has its
-//! turn. Growth is the exponent of time by the number of lights between the two largest numbers, 1 if twice the lights take twice the
-//! time.
+//! turn. Growth is the exponent of time by the number of lights between the two largest numbers, 1 if twice the lights take
+//! twice the time.
 
 mod common;
 
@@ -15,15 +15,16 @@ use common::adapter::{Gpu, Wishes};
 use common::clock::median;
 use common::offline::{self, Component, Offline};
 use common::{arguments, named_scene};
-use lightfall::frame::{IndirectMethod, Settings};
+use lightfall::frame::{IndirectMethod, PhotonFeeder, Settings};
 use lightfall::pass::{
     IndirectShadows, LightForm, SurfaceLightShading, SurfaceLightShadingInputs, SurfaceLightShadingResources,
     SurfaceLightShadingSettings,
 };
 use lightfall::resource::{Irradiance, Subsampling};
 use lightfall::scene::SceneSummary;
-use lightfall::{Error, wgpu};
-use std::time::Instant;
+use lightfall::{Error, read_buffer_blocking, wgpu};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 /// Sizes of the paper's Tables 2 and 3.
 const SIZES: [[u32; 2]; 2] = [[800, 600], [1280, 1024]];
@@ -95,7 +96,44 @@ fn run(arguments: &Arguments) -> Result<(), String> {
             }
         }
     }
+    for name in &arguments.scenes {
+        let (gpu_rate, threads_rate) = impacts_per_second(&gpu, name)?;
+        println!("\n{name}: {gpu_rate:.2e} impacts a second by tracers, {threads_rate:.2e} by two threads");
+    }
     gpu.check()
+}
+
+/// Of a pool that is filled at once by tracers, and of threads of the processor by themselves.
+fn impacts_per_second(gpu: &Gpu, name: &str) -> Result<(f64, f64), String> {
+    let scene = named_scene::load(name, 0.0)?;
+    let mut settings = Settings {
+        indirect_method: IndirectMethod::SurfaceLights,
+        ..Settings::fast()
+    };
+    settings.set("tracer.kind", "bvh").map_err(|e| e.to_string())?;
+    let time = || -> Result<(f64, f64), Error> {
+        let mut offline = Offline::new(gpu, scene.clone(), &settings, 0, [64, 64], Component::Indirect)?;
+        // The first makes pipelines.
+        offline.render_frame(None)?;
+        let frames = settings.surface_lights.pool.div_ceil(settings.surface_lights.stream);
+        let start = Instant::now();
+        (0..frames).try_for_each(|_| offline.render_frame(None))?;
+        let seconds = start.elapsed().as_secs_f64();
+        let stored: f64 = match offline.renderer.photon_pool() {
+            Some(pool) => {
+                let impacts: Vec<[u32; 8]> = read_buffer_blocking(&gpu.device, &gpu.queue, pool.buffer())?;
+                impacts.iter().filter(|i| (i[1] | i[2] | i[3]) != 0).count() as f64
+            }
+            None => 0.0,
+        };
+        let feeder = PhotonFeeder::new(settings.surface_lights.stream, settings.bounces - 1, 2);
+        if let Some(frame) = offline.renderer.frame() {
+            feeder.set_scene(frame, &Arc::new(scene.clone()));
+        }
+        std::thread::sleep(Duration::from_secs(1));
+        Ok((stored / seconds, feeder.impacts_per_second()))
+    };
+    time().map_err(|e| e.to_string())
 }
 
 /// Exponent between the last two.

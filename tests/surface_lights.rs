@@ -350,6 +350,19 @@ fn a_pool_that_is_filled_at_once_is_the_one_that_frames_fill() {
     // Until something moves.
     at_once.renderer.geometry_changed();
     assert_eq!(passes(&mut at_once), busy);
+    // As many as the host wants.
+    at_once.in_motion = true;
+    at_once.renderer.set_streamed_photons(0);
+    assert_eq!(passes(&mut at_once), resting);
+    let next = |offline: &Offline<'_>| offline.renderer.photon_pool().unwrap().next();
+    let before = next(&at_once);
+    at_once.renderer.set_streamed_photons(300);
+    at_once.render_frame(None).unwrap();
+    assert_eq!(next(&at_once), (before + 300) % 8000);
+    at_once.renderer.set_streamed_photons(1_000_000);
+    at_once.render_frame(None).unwrap();
+    assert_eq!(next(&at_once), (before + 1300) % 8000);
+    assert!((mean(&at_once.read().unwrap()) / mean(&first) - 1.0).abs() < 0.01);
     assert_no_errors(&gpu);
 }
 

@@ -4,9 +4,10 @@
 //! cargo run --release --example shadow_study -- --write docs/shadows.md --picture docs/shadows.png
 //! ```
 //!
-//! The truth is 512 rays to the lamp from each pixel, or, for widths of penumbrae of a square lamp and the straight edge of a plate,
-//! visibility that rises linearly. Errors are root mean squares of visibility over the pixels of the penumbra, those that see a part of the lamp;
-//! *elsewhere* over all others. Times are of all of the pass, on the wall, medians of rounds in which each way has its turn.
+//! The truth is 512 rays to the lamp from each pixel, or, for widths of penumbrae of a square lamp and the straight edge of a
+//! plate, visibility that rises linearly. Errors are root mean squares of visibility over the pixels of the penumbra, those
+//! that see a part of the lamp; *elsewhere* over all others. Times are of all of the pass, on the wall, medians of rounds in
+//! which each way has its turn.
 
 #[path = "../common/mod.rs"]
 mod common;

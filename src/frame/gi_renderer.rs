@@ -55,6 +55,8 @@ pub struct GiRenderer {
     state: Option<SceneState>,
     stand_ins: StandIns,
     placement: EnvMapPlacement,
+    /// Photons traced a frame, caustic ones aside.
+    streamed: u32,
     /// World space, as the host last gave them.
     surface_places: Vec<SurfacePlace>,
     #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
@@ -152,8 +154,9 @@ pub struct ViewInputs<'a> {
     pub queue: &'a wgpu::Queue,
     /// The geometry that was prepared.
     pub geometry: &'a dyn Geometry,
-    /// The same geometry as triangles, prepared for this frame: what rays of [`Stage::FinalGather`], [`Stage::SurfaceLightShading`] and
-    /// [`Stage::SpecularPaths`] meet where the settings trace triangles, and those of [`Stage::SoftShadow`] where they say so.
+    /// The same geometry as triangles, prepared for this frame: what rays of [`Stage::FinalGather`],
+    /// [`Stage::SurfaceLightShading`] and [`Stage::SpecularPaths`] meet where the settings trace triangles, and those of
+    /// [`Stage::SoftShadow`] where they say so.
     #[cfg(feature = "bvh")]
     pub bvh: Option<&'a BvhGeometry>,
     /// One of the views that were prepared.
@@ -207,6 +210,7 @@ impl GiRenderer {
             state: None,
             stand_ins: StandIns::default(),
             placement: EnvMapPlacement::default(),
+            streamed: settings.traced_photons(),
             surface_places: Vec::new(),
             #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
             photon_feeder: None,
@@ -225,8 +229,8 @@ impl GiRenderer {
     }
 
     /// Gives the image that an environment light refers to, whatever the index in [`LightKind::Environment`]: of a `Scene` that of
-    /// [`Scene::environment_image`](crate::scene::Scene::environment_image). `None` drops it. Uploads it, and divides it into suns with
-    /// the next `set_scene`: call it before that, when the image changes, not every frame.
+    /// [`Scene::environment_image`](crate::scene::Scene::environment_image). `None` drops it. Uploads it, and divides it into
+    /// suns with the next `set_scene`: call it before that, when the image changes, not every frame.
     ///
     /// # Errors
     /// As [`EnvironmentImage::validate`]; [`Error::LimitExceeded`] for one that is larger than a texture may be. The old one stays
@@ -309,9 +313,7 @@ impl GiRenderer {
                     suns: &state.suns,
                     lamps: &state.lamps,
                 };
-                direct
-                    .lights
-                    .write(queue, &frame, &sources, self.settings.traced_photons())?;
+                direct.lights.write(queue, &frame, &sources, self.streamed)?;
             }
             if let (Some(direct), Some(indirect)) = (&self.direct, &mut self.indirect) {
                 indirect.aim_caustics(queue, &frame, &direct.lights, &summary.specular_bounds);
@@ -397,7 +399,8 @@ impl GiRenderer {
     ///
     /// Where places are chosen by what photons reach ([`CoverageMeasure::Photons`](crate::pass::CoverageMeasure)), photons are
     /// traced for it, through maps in places chosen by area, then through better ones. Triangles are not at hand here: where the
-    /// settings trace them alone, the first hits of photons decide (of lamps there are none), and the frames that follow choose better by all of them.
+    /// settings trace them alone, the first hits of photons decide (of lamps there are none), and the frames that follow choose
+    /// better by all of them.
     ///
     /// # Errors
     /// [`Error::ReadBack`], [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
@@ -474,13 +477,24 @@ impl GiRenderer {
         self.renew_centers(queue)
     }
 
-    /// Says where surface lights stand: places that were chosen once ([`SurfacePoint::place`](crate::scene::SurfacePoint::place), with
-    /// [`SurfaceLightSettings::places`](super::SurfaceLightSettings::places)), where their instances are now. Once, and whenever an
-    /// instance has moved. Of as many places as before each is taken for the same one, and keeps its light.
+    /// Says where surface lights stand: places that were chosen once
+    /// ([`SurfacePoint::place`](crate::scene::SurfacePoint::place), with
+    /// [`SurfaceLightSettings::places`](super::SurfaceLightSettings::places)), where their instances are now. Once, and
+    /// whenever an instance has moved. Of as many places as before each is taken for the same one, and keeps its light.
     pub fn set_surface_places(&mut self, places: &[SurfacePlace]) {
         if self.surface_places != places {
             self.surface_places = places.to_vec();
             self.revision += 1;
+        }
+    }
+
+    /// Says how many photons surface lights take each frame from the next `set_scene` on, at most
+    /// [`SurfaceLightSettings::stream`](super::SurfaceLightSettings::stream), with which it begins: more where light changes
+    /// fast, fewer to save time, 0 to keep what there is. Lights at impacts take as many as they are.
+    pub fn set_streamed_photons(&mut self, count: u32) {
+        let (method, placement) = (self.settings.indirect_method, self.settings.surface_lights.placement);
+        if (method, placement) == (IndirectMethod::SurfaceLights, LightPlacement::OnSurfaces) {
+            self.streamed = count.min(self.settings.traced_photons());
         }
     }
 
@@ -574,9 +588,9 @@ impl GiRenderer {
         self.record_photons(encoder, inputs)
     }
 
-    /// Takes the photons of surface lights from threads of the processor instead of tracers on the GPU; `None`: from tracers again. The
-    /// host tells it of scenes ([`PhotonFeeder::set_scene`]). In frames that find no batch ready, the pool stays as it was. Of
-    /// [`SurfaceLightSettings::stream`](super::SurfaceLightSettings::stream) paths, and one bounce less than
+    /// Takes the photons of surface lights from threads of the processor instead of tracers on the GPU; `None`: from tracers
+    /// again. The host tells it of scenes ([`PhotonFeeder::set_scene`]). In frames that find no batch ready, the pool stays as
+    /// it was. Of [`SurfaceLightSettings::stream`](super::SurfaceLightSettings::stream) paths, and one bounce less than
     /// [`Settings::bounces`]. Returns the one before.
     #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
     pub fn set_photon_feeder(&mut self, feeder: Option<PhotonFeeder>) -> Option<PhotonFeeder> {
@@ -604,7 +618,10 @@ impl GiRenderer {
         if self.photon_feeder.is_some() {
             return Ok(());
         }
-        let per_round = self.settings.traced_photons().max(1);
+        if self.streamed == 0 {
+            return Ok(());
+        }
+        let per_round = self.streamed.max(1);
         let rounds = self.photon_pool().map_or(0, PhotonPool::paths).div_ceil(per_round);
         if let Some(lights) = self.indirect.as_mut().and_then(IndirectScene::surface_lights_mut) {
             lights.wake();
@@ -636,7 +653,11 @@ impl GiRenderer {
                 remedy: "hand them to GiRenderer::set_surface_places, or choose surface_lights.placement = at-impacts",
             });
         }
-        lights.follow((&self.device, queue), &state.frame, &self.surface_places)
+        lights.follow((&self.device, queue), &state.frame, &self.surface_places)?;
+        match &mut self.indirect {
+            Some(indirect) => indirect.stream(self.streamed),
+            None => Ok(()),
+        }
     }
 
     fn record_photons(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) -> Result<(), Error> {
@@ -762,8 +783,8 @@ impl GiRenderer {
     ///
     /// # Errors
     /// [`Error::LimitExceeded`] when a stage that the view needs for the first time does not fit; [`Error::MissingInput`] if
-    /// [`Stage::FinalGather`], [`Stage::SurfaceLightShading`], [`Stage::SpecularPaths`] or [`Stage::SoftShadow`] is on, the settings trace triangles there, and none
-    /// are given. Nothing is recorded then.
+    /// [`Stage::FinalGather`], [`Stage::SurfaceLightShading`], [`Stage::SpecularPaths`] or [`Stage::SoftShadow`] is on, the
+    /// settings trace triangles there, and none are given. Nothing is recorded then.
     pub fn record_view(
         &self,
         encoder: &mut wgpu::CommandEncoder,

@@ -234,6 +234,11 @@ impl IndirectScene {
         &self.global.photons
     }
 
+    /// Traces so many photons from now on, of those that there is room for.
+    pub(super) fn stream(&mut self, count: u32) -> Result<(), Error> {
+        self.global.set_count(count)
+    }
+
     pub(super) fn surface_lights(&self) -> Option<&SurfaceLightScene> {
         self.surface_lights.as_ref()
     }

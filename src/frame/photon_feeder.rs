@@ -1,9 +1,9 @@
 //! Photons that the processor traces in threads of its own while the GPU draws (photon streaming with virtual surface
 //! lights, section 0.7.2).
 //!
-//! The thread that renders hands over a scene when it has changed and takes what is there when it is there: it never waits, and no thread
-//! waits in a channel for it. Limits: bulbs, spots and suns have no extent; metal reflects like a mirror and glass ends a path; textures
-//! are looked up without filtering, cut-outs are whole.
+//! The thread that renders hands over a scene when it has changed and takes what is there when it is there: it never waits, and
+//! no thread waits in a channel for it. Limits: bulbs, spots and suns have no extent; metal reflects like a mirror and glass
+//! ends a path; textures are looked up without filtering, cut-outs are whole.
 
 use crate::halton::radical_inverse;
 use crate::resource::bvh_tree::binary_tree;
@@ -101,8 +101,8 @@ impl PhotonFeeder {
         let _ = self.scenes.send(snapshot);
     }
 
-    /// Uploads the next batch, if one is there and `photons` has room for as many paths of as many scatterings; else it leaves them alone
-    /// and returns false. Does not wait.
+    /// Uploads the next batch, if one is there and `photons` has room for as many paths of as many scatterings; else it leaves
+    /// them alone and returns false. Does not wait.
     pub fn upload(&self, queue: &wgpu::Queue, photons: &Photons) -> bool {
         let fits = photons.count() == self.paths && photons.bounces() == self.bounces;
         let newest = self.newest.load(Ordering::Relaxed);

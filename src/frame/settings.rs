@@ -53,8 +53,8 @@ pub enum IndirectMethod {
     /// rays. It takes environment maps, whatever the tracer; rays meet what photons do. Light has one bounce more.
     FinalGather,
     /// From virtual surface lights: points on surfaces that stand for the light of a pool of photons around them. No kernel and no
-    /// noise of photons; their number is that of lights. It takes places, [`GiRenderer::set_surface_places`](super::GiRenderer::set_surface_places), or
-    /// stands them where photons arrive.
+    /// noise of photons; their number is that of lights. It takes places,
+    /// [`GiRenderer::set_surface_places`](super::GiRenderer::set_surface_places), or stands them where photons arrive.
     SurfaceLights,
 }
 
@@ -71,10 +71,11 @@ pub enum LightPlacement {
 /// Surface lights, and the photons that they are made of.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceLightSettings {
-    /// Places to choose, 1 to 16384: what a host gives to [`SurfacePoint::place`](crate::scene::SurfacePoint::place). More resolve more, and
-    /// cost in proportion.
+    /// Places to choose, 1 to 16384: what a host gives to [`SurfacePoint::place`](crate::scene::SurfacePoint::place). More
+    /// resolve more, and cost in proportion.
     pub places: u32,
-    /// Paths in the pool, 1 to 16777216, rounded up to a multiple of `stream`. More have less noise, and take longer to follow a change.
+    /// Paths in the pool, 1 to 16777216, rounded up to a multiple of `stream`. More have less noise, and take longer to follow
+    /// a change.
     pub pool: u32,
     /// Photons traced a frame, 1 or more: as many of the pool are replaced. More follow changes faster, and cost in proportion.
     pub stream: u32,
@@ -176,10 +177,10 @@ pub struct Settings {
     /// Photons emitted a frame. Cost grows in proportion; noise falls as the square root. Of surface lights
     /// [`SurfaceLightSettings::stream`] says how many.
     pub photons: u32,
-    /// Share of the photons, from 0 and below 1, that go in those directions, from their light and from diffuse surfaces, whose paths
-    /// were seen in the frames before; the others are spread evenly. Pays where much of the light never comes before the eye, as
-    /// through a doorway or of a sun over a building; costs two looks at each photon, noise while things move, and, where frames
-    /// are not accumulated, one to two hundredths of the light. 0.5 is a good start (`docs/density.md`).
+    /// Share of the photons, from 0 and below 1, that go in those directions, from their light and from diffuse surfaces, whose
+    /// paths were seen in the frames before; the others are spread evenly. Pays where much of the light never comes before the
+    /// eye, as through a doorway or of a sun over a building; costs two looks at each photon, noise while things move, and,
+    /// where frames are not accumulated, one to two hundredths of the light. 0.5 is a good start (`docs/density.md`).
     pub guided_photons: f32,
     /// How photons find where they first land. Shadow maps are faster, and curved mirrors in them a little flattened. Those of
     /// caustics are traced wherever there are triangles, which then trace all of their hops.
@@ -196,8 +197,8 @@ pub struct Settings {
     /// Texels along a face of an environment map. Finer resolves thinner things and costs memory and capture time as the
     /// square.
     pub env_map_size: u32,
-    /// Suns that stand for an environment, 0 to 48, as parallel lights with an extent. More are nearer to its true light; each costs
-    /// a shadow map and a search for penumbrae. 0: it is seen, and lights no diffuse surface.
+    /// Suns that stand for an environment, 0 to 48, as parallel lights with an extent. More are nearer to its true light; each
+    /// costs a shadow map and a search for penumbrae. 0: it is seen, and lights no diffuse surface.
     pub environment_suns: u32,
     /// Texels along a layer of a shadow map. Finer sharpens shadow edges, direct and in first hits; costs as the square.
     pub shadow_map_size: u32,
@@ -245,8 +246,8 @@ pub struct Settings {
     pub upsampler: UpsamplerSettings,
     /// Whether penumbrae are gathered, indirect light is interpolated to all pixels and all light is summed in one pass
     /// ([`FusedComposite`](crate::pass::FusedComposite)) instead of one after the other. Saves memory and what passes write for
-    /// each other; crosses become discs, pixels in doubt at the last level are not estimated anew, and there is no irradiance of a view
-    /// to look at.
+    /// each other; crosses become discs, pixels in doubt at the last level are not estimated anew, and there is no irradiance
+    /// of a view to look at.
     pub fuses_composite: bool,
 }
 

@@ -107,7 +107,8 @@ impl SurfaceLightScene {
         };
         let first = self.begin(inputs.photons.revision, inputs.sample_offset);
         inputs.sample_offset = first.unwrap_or(0);
-        let is_new = first.is_some() && bring_photons(encoder, passes, traced, &inputs)?;
+        let is_wanted = first.is_some() && traced.photons.count() > 0;
+        let is_new = is_wanted && bring_photons(encoder, passes, traced, &inputs)?;
         let (queue, timestamps) = (inputs.photons.scene.queue, inputs.photons.scene.timestamps);
         let (photons, lights) = (&traced.photons, &mut self.lights);
         let Some(pool) = &mut self.pool else {

@@ -62,6 +62,14 @@ impl TracedPhotons {
         })
     }
 
+    /// Traces so many from now on, of those that there is room for.
+    pub(super) fn set_count(&mut self, count: u32) -> Result<(), Error> {
+        if count != self.photons.count() {
+            self.photons = self.photons.part(count)?;
+        }
+        Ok(())
+    }
+
     /// Forgets lights and shadow maps that are no more.
     pub(super) fn renew_emitter(&mut self, device: &wgpu::Device) -> Result<(), Error> {
         self.emitter = PhotonEmitterResources::new(device)?;

@@ -1,5 +1,5 @@
-//! Puts light together: L = L_e + ρ/π · (E_direct + E_indirect + E_caustic), or of specular surfaces what is seen in them, scaled back to
-//! world units.
+//! Puts light together: L = L_e + ρ/π · (E_direct + E_indirect + E_caustic), or of specular surfaces what is seen in them,
+//! scaled back to world units.
 //!
 //! Inputs: [`GBuffer`], two or three [`Irradiance`]s, what [`SpecularPaths`](super::SpecularPaths) gives, and the [`Environment`].
 //! Output: [`Radiance`]. Cost: one full-screen pass. Source: Larsen 2004,

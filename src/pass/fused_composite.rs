@@ -1,17 +1,17 @@
-//! All that follows the hard shadow tests in one pass over the G-buffer: penumbrae are gathered, indirect light is interpolated, direct
-//! light is summed, and all of it put together as [`Composite`](super::Composite) does.
+//! All that follows the hard shadow tests in one pass over the G-buffer: penumbrae are gathered, indirect light is
+//! interpolated, direct light is summed, and all of it put together as [`Composite`](super::Composite) does.
 //!
 //! Inputs: [`GBuffer`], [`Lights`], [`ShadowMaps`], [`PendingPenumbrae`] of [`SoftShadow`](super::SoftShadow) with
-//! [`NearestOccluders`], indirect [`Irradiance`] of some [`Subsampling`], what [`SpecularPaths`](super::SpecularPaths) gives, and the
-//! [`Environment`]. Output: [`Radiance`]. It stands for the steps of `SoftShadow` after its test, [`Upsampler`](super::Upsampler),
-//! [`DirectLight`](super::DirectLight) and `Composite`, and gives what they give with [`ShadowMethod::Disc`](super::ShadowMethod)
-//! and samples interpolated at once, to rounding. Between them no visibility, no radius and no irradiance of all pixels is
-//! written and read again: `docs/shadows.md` has bytes and times of both.
+//! [`NearestOccluders`], indirect [`Irradiance`] of some [`Subsampling`], what [`SpecularPaths`](super::SpecularPaths) gives,
+//! and the [`Environment`]. Output: [`Radiance`]. It stands for the steps of `SoftShadow` after its test,
+//! [`Upsampler`](super::Upsampler), [`DirectLight`](super::DirectLight) and `Composite`, and gives what they give with
+//! [`ShadowMethod::Disc`](super::ShadowMethod) and samples interpolated at once, to rounding. Between them no visibility, no
+//! radius and no irradiance of all pixels is written and read again: `docs/shadows.md` has bytes and times of both.
 //!
-//! Cost: one full-screen pass; a pixel that may lie in a penumbra takes 4 `search_taps` + `disc_taps` taps of two fetches a light. Source: Yao et
-//! al., soft shadows and image-space photon mapping, section 3.4 (soft shadow, up-sampling and sum in one pass), with the changes that
-//! the passes it stands for have. Limits: theirs; pixels that up-sampling leaves in doubt are not estimated anew, and there is no
-//! irradiance for a host to look at or to filter.
+//! Cost: one full-screen pass; a pixel that may lie in a penumbra takes 4 `search_taps` + `disc_taps` taps of two fetches a
+//! light. Source: Yao et al., soft shadows and image-space photon mapping, section 3.4 (soft shadow, up-sampling and sum in one
+//! pass), with the changes that the passes it stands for have. Limits: theirs; pixels that up-sampling leaves in doubt are not
+//! estimated anew, and there is no irradiance for a host to look at or to filter.
 
 use super::full_screen::{FullScreen, FullScreenResources};
 use super::{CompositeSettings, UpsamplerSettings, composite, upsampler};
@@ -90,8 +90,8 @@ pub struct FusedCompositeInputs<'a> {
     pub lights: &'a Lights,
     /// What they see.
     pub shadow_maps: &'a ShadowMaps,
-    /// What is known of each light's shadow, of the G-buffer's size, and how near to the lights anything stands; `None`, and of lights
-    /// beyond its layers: hard shadows.
+    /// What is known of each light's shadow, of the G-buffer's size, and how near to the lights anything stands; `None`, and of
+    /// lights beyond its layers: hard shadows.
     pub penumbrae: Option<(&'a PendingPenumbrae, &'a NearestOccluders)>,
     /// Light by way of other surfaces, of the size that `subsampling` makes of the G-buffer's.
     pub indirect: &'a Irradiance,

@@ -4,11 +4,12 @@
 //! surface lights, section 0.5 and Algorithm 2, with changes: an impact counts the flux that its surface sends *on*; the pool
 //! holds whole paths, each of the flux that one of as many emitted at once has, so that its energy is the lights'; fluxes are
 //! whole numbers, so that sums never drift, rounded by chance that belongs to the place in the pool.
-//! A light shines from where that of its impacts arrived that is nearest to its place: places may be hidden, and what no light reaches
-//! should not shine (`docs/surface_lights.md`). [`PhotonStream::record_at_impacts`] is instant radiosity (Keller 1997), the paper's baseline.
+//! A light shines from where that of its impacts arrived that is nearest to its place: places may be hidden, and what no light
+//! reaches should not shine (`docs/surface_lights.md`). [`PhotonStream::record_at_impacts`] is instant radiosity (Keller 1997),
+//! the paper's baseline.
 //!
-//! Cost: impacts of the new paths; of each, the cells of the grid around it up to the nearest light; two looks at each impact of the pool. Limits: diffuse surfaces alone send light on
-//! here; what glossy ones reflect is photons' matter.
+//! Cost: impacts of the new paths; of each, the cells of the grid around it up to the nearest light; two looks at each impact
+//! of the pool. Limits: diffuse surfaces alone send light on here; what glossy ones reflect is photons' matter.
 
 use super::dispatch_64;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};

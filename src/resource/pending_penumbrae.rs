@@ -33,11 +33,11 @@ pub(crate) fn tile_counts(size: [u32; 2]) -> [u32; 2] {
     size.map(|side| side.div_ceil(TILE))
 }
 
-/// Shadows of each light as far as they are found without looking at a pixel's neighbours: in a layer of a 2D array of `r32float` what
-/// [`Visibility`] holds, or, of a light whose penumbra is to be gathered in image space, how far before the receiver its occluder
-/// stands, unit frame; −1 where none does, −2 where no surface is seen or it faces away. Beside them, which tiles of 8 × 8 pixels may
-/// hold a penumbra, and how it is to be looked for. Filled by [`SoftShadow`](crate::pass::SoftShadow), for
-/// [`FusedComposite`](crate::pass::FusedComposite).
+/// Shadows of each light as far as they are found without looking at a pixel's neighbours: in a layer of a 2D array of
+/// `r32float` what [`Visibility`] holds, or, of a light whose penumbra is to be gathered in image space, how far before the
+/// receiver its occluder stands, unit frame; −1 where none does, −2 where no surface is seen or it faces away. Beside them,
+/// which tiles of 8 × 8 pixels may hold a penumbra, and how it is to be looked for. Filled by
+/// [`SoftShadow`](crate::pass::SoftShadow), for [`FusedComposite`](crate::pass::FusedComposite).
 #[derive(Debug)]
 pub struct PendingPenumbrae {
     layers: Visibility,

@@ -18,9 +18,9 @@ pub(crate) mod gpu {
     }
 }
 
-/// Paths that are replaced one after the other, the oldest first: of each impact the light that it counts for, what it counts there, in
-/// whole steps, and where it arrived, from the light's place; a storage buffer of 32 bytes an impact, `hop` × paths + `path` in order. Emptied where lights are other ones
-/// ([`PhotonPool::restart`]).
+/// Paths that are replaced one after the other, the oldest first: of each impact the light that it counts for, what it counts
+/// there, in whole steps, and where it arrived, from the light's place; a storage buffer of 32 bytes an impact, `hop` × paths +
+/// `path` in order. Emptied where lights are other ones ([`PhotonPool::restart`]).
 #[derive(Debug)]
 pub struct PhotonPool {
     buffer: wgpu::Buffer,

@@ -25,8 +25,8 @@ pub struct Photon {
     /// Radiant flux that the hop carried, unit frame, before the surface takes its share.
     pub flux: [f32; 3],
     /// Density of photons of this hop per unit area at its end: q(ω)·cosθ/d² (q the solid-angle pdf of its
-    /// direction), 1 / (unit-frame length)². On metal and glass instead, in the upper and the lower 16 bits, the upper halves of the
-    /// radius of a photon's footprint and of its growth in a unit of length.
+    /// direction), 1 / (unit-frame length)². On metal and glass instead, in the upper and the lower 16 bits, the upper halves
+    /// of the radius of a photon's footprint and of its growth in a unit of length.
     pub density: f32,
     /// Normal on the side hit, octahedral (`pack2x16snorm`): the geometric one, of metal and glass the shading normal.
     pub normal: u32,
@@ -226,6 +226,18 @@ impl Photons {
             bounces,
             map: PhotonMap::All,
             bytes: 0,
+        })
+    }
+
+    /// The same buffer for another number of paths.
+    ///
+    /// # Errors
+    /// [`Error::CountMismatch`] for more than there is room for.
+    pub(crate) fn part(&self, count: u32) -> Result<Self, Error> {
+        Ok(Self {
+            map: self.map,
+            bytes: self.bytes,
+            ..Self::from_buffer(&self.buffer, count, self.bounces)?
         })
     }
 

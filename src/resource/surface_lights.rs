@@ -42,8 +42,8 @@ pub(crate) mod gpu {
 }
 
 /// Lights on surfaces, two at each place, one for either side: light 2 i on the side that its normal points to. Storage
-/// buffers: 32 bytes a light (position, area, normal, 0; unit frame), where it stands and where it shines from, and its flux, red, green and blue as whole numbers of
-/// [`SurfaceLights::flux_of_step`], with the number of photons that it is of. Filled by
+/// buffers: 32 bytes a light (position, area, normal, 0; unit frame), where it stands and where it shines from, and its flux,
+/// red, green and blue as whole numbers of [`SurfaceLights::flux_of_step`], with the number of photons that it is of. Filled by
 /// [`PhotonStream`](crate::pass::PhotonStream), shone by [`SurfaceLightShading`](crate::pass::SurfaceLightShading).
 #[derive(Debug)]
 pub struct SurfaceLights {
@@ -165,8 +165,8 @@ impl SurfaceLights {
         &self.records
     }
 
-    /// The same, but with the position that they shine from: that of their impact that is nearest to their place, or the place until
-    /// there is one.
+    /// The same, but with the position that they shine from: that of their impact that is nearest to their place, or the place
+    /// until there is one.
     pub fn shining(&self) -> &wgpu::Buffer {
         &self.shining
     }

@@ -7,8 +7,8 @@ use glam::{DAffine3, DMat3, DVec3, Vec3};
 /// Share of a triangle's extent that points are placed in, around its centroid: they stay away from its edges.
 const SHRUNK: f64 = 0.9;
 
-/// Points that are placed at first and removed again, over those that stay. With the paper's tenth, closest points lie half as far apart
-/// as darts of the same number; with three times as many, 0.8 of it; five times gain a hundredth more.
+/// Points that are placed at first and removed again, over those that stay. With the paper's tenth, closest points lie half as
+/// far apart as darts of the same number; with three times as many, 0.8 of it; five times gain a hundredth more.
 const TOO_MANY: f64 = 3.0;
 
 /// No more than so many, and the paper's tenth: time grows as the square.
@@ -32,10 +32,11 @@ impl SurfacePoint {
     /// instance that has an area: with more such instances than `count`, as many as instances. Deterministic. Takes time in
     /// proportion to the triangles and to `count` squared.
     ///
-    /// Source: photon streaming with virtual surface lights, section 0.4.2 and Algorithm 1: points are placed in shrunk triangles by
-    /// area, too many, and of the two that lie closest the one whose second neighbour is closer goes, until `count` are
-    /// left. Changes: four times as many instead of a tenth more, up to 3000; places come from the Halton sequence instead of at random; points that face apart, as on both sides of a wall, are no
-    /// neighbours; the last point of an instance stays.
+    /// Source: photon streaming with virtual surface lights, section 0.4.2 and Algorithm 1: points are placed in shrunk
+    /// triangles by area, too many, and of the two that lie closest the one whose second neighbour is closer goes, until
+    /// `count` are left. Changes: four times as many instead of a tenth more, up to 3000; places come from the Halton sequence
+    /// instead of at random; points that face apart, as on both sides of a wall, are no neighbours; the last point of an
+    /// instance stays.
     pub fn place(scene: &Scene, count: usize) -> Vec<Self> {
         let sampled: Vec<_> = scene
             .instances

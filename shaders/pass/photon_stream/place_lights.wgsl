@@ -1,5 +1,5 @@
-// Each light shines from where the impact arrived that is nearest to its place, and not from the place itself, which may be hidden: below
-// a column's foot, between two walls. Impacts are kept as offsets from their lights, and move along with them.
+// Each light shines from where the impact arrived that is nearest to its place, and not from the place itself, which may be
+// hidden: below a column's foot, between two walls. Impacts are kept as offsets from their lights, and move along with them.
 
 struct Params {
     // Of the pool

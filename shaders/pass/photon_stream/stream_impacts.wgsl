@@ -1,6 +1,6 @@
 // New paths replace the oldest of the pool: what these had sent on is taken from their lights, and what those send on goes to the
-// lights nearest to where they arrived. One invocation an impact. All of it is whole numbers, so that a light holds the sum of the impacts that point to it,
-// exactly and for good.
+// lights nearest to where they arrived. One invocation an impact. All of it is whole numbers, so that a light holds the sum of
+// the impacts that point to it, exactly and for good.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> grid: SurfaceLightGrid;

@@ -1,8 +1,9 @@
 //! Soft shadows of lamps with an extent.
 //!
 //! Inputs: [`GBuffer`], [`Lights`], [`ShadowMaps`], [`NearestOccluders`], and triangles for rays. Output: [`Visibility`], one
-//! layer a light, or [`PendingPenumbrae`], where [`FusedComposite`](super::FusedComposite) does the gathering. A light without extent gets the hard test of [`DirectLight`](super::DirectLight) and nothing else. One with an
-//! extent has its penumbra found by a [`ShadowMethod`]:
+//! layer a light, or [`PendingPenumbrae`], where [`FusedComposite`](super::FusedComposite) does the gathering. A light without
+//! extent gets the hard test of [`DirectLight`](super::DirectLight) and nothing else. One with an extent has its penumbra found
+//! by a [`ShadowMethod`]:
 //!
 //! - *In image space* (`Cross`, `Disc`; `gather.rs`). A *test* says of each pixel whether the lamp's centre is seen, and how far
 //!   before the receiver its occluder stands; tiles of 8 × 8 pixels that see both light and shadow within reach are listed; there
@@ -14,18 +15,18 @@
 //!   on the receiver's plane instead of the screen's, weighted as a disc-shaped lamp is, so that the straight edge of an occluder
 //!   parallel to the lamp has the exact profile V(x) = 1/2 + (x √(1 − x²) + asin x) / π, x in radii, of a `Cross` if it lies along
 //!   an axis, and its second moment anyhow.
-//! - *In the shadow maps* (`Pcf`, `Pcss`; `over_pixels.rs`): the same radius and the same ellipse, but points of the receiver's plane
-//!   are tested in the shadow maps, whatever the eye sees there. Sources: Reeves, Salesin and Cook 1987; Fernando 2005.
+//! - *In the shadow maps* (`Pcf`, `Pcss`; `over_pixels.rs`): the same radius and the same ellipse, but points of the receiver's
+//!   plane are tested in the shadow maps, whatever the eye sees there. Sources: Reeves, Salesin and Cook 1987; Fernando 2005.
 //! - *By rays* to points all over the lamp (`Rays`; `over_pixels.rs`): the share of its light that comes unhindered.
 //!
 //! Cost: pixels × lights with an extent × taps: of `Cross`, in listed tiles alone, 4 `search_taps` + 4 `blur_taps` + 2 of two
 //! fetches; of `Pcss` 4 `search_taps` + `disc_taps` tests; `docs/shadows.md` measures them.
 //!
-//! Limits: in image space, a penumbra whose shadow lies off the screen, or hidden, as a whole is not looked for (what else is off the screen, or
-//! hidden, is asked of the shadow maps); penumbrae wider than `max_radius` are cut to it; the blur of an edge that slants between
-//! the axes of a `Cross` reaches up to √2 radii. In shadow maps, the receiver's plane is taken to go on below other surfaces. In both, one mean distance stands for occluders behind each
-//! other; a spot's disc is taken to face the receiver, a flat lamp is the disc of its area; receivers tilted beyond 83° count as
-//! tilted so far.
+//! Limits: in image space, a penumbra whose shadow lies off the screen, or hidden, as a whole is not looked for (what else is
+//! off the screen, or hidden, is asked of the shadow maps); penumbrae wider than `max_radius` are cut to it; the blur of an
+//! edge that slants between the axes of a `Cross` reaches up to √2 radii. In shadow maps, the receiver's plane is taken to go
+//! on below other surfaces. In both, one mean distance stands for occluders behind each other; a spot's disc is taken to face
+//! the receiver, a flat lamp is the disc of its area; receivers tilted beyond 83° count as tilted so far.
 
 pub(crate) mod gather;
 pub(crate) mod over_pixels;
@@ -96,17 +97,17 @@ pub struct SoftShadowSettings {
     /// Where the width of penumbrae comes from, in image space. Off saves the search and gets widths wrong.
     pub search: PenumbraSearch,
     /// Taps on each of the four arms of the search, up to 64, of `Pcss` a quarter of them. More find smaller occluders and
-    /// steadier widths, at a cost in proportion: 2 instead of 4, with 3 to blur instead of 5, have 1.15 times the error for three quarters
-    /// of the time.
+    /// steadier widths, at a cost in proportion: 2 instead of 4, with 3 to blur instead of 5, have 1.15 times the error for
+    /// three quarters of the time.
     pub search_taps: u32,
     /// Taps of a `Cross` to each side of each axis, 1 to 64. More have less grain in wide penumbrae, at a cost in
     /// proportion: 7 instead of 5 have 0.95 of the error for a tenth more time, 20 with 16 to search 0.9 for 2.7 times the time.
     pub blur_taps: u32,
-    /// Taps of a `Disc`, `Pcf` and `Pcss`, up to 4096, likewise. Of a disc 16, 32, 128: mean errors of 0.069, 0.060, 0.054; of `Pcss`
-    /// with as many to search 16, 32, and 128 with 64: 0.076, 0.054, 0.041, for a third, 1 and 3 times a cross's time.
+    /// Taps of a `Disc`, `Pcf` and `Pcss`, up to 4096, likewise. Of a disc 16, 32, 128: mean errors of 0.069, 0.060, 0.054; of
+    /// `Pcss` with as many to search 16, 32, and 128 with 64: 0.076, 0.054, 0.041, for 0.6, 1 and 3 times a cross's time.
     pub disc_taps: u32,
-    /// Rays to the lamp from each pixel, up to 4096. 4, 16, 64: 0.139, 0.050, 0.018 for twice, 7 and 28 times a cross's time; accumulated
-    /// over frames they are exact.
+    /// Rays to the lamp from each pixel, up to 4096. 4, 16, 64: 0.139, 0.050, 0.018 for twice, 7 and 28 times a cross's time;
+    /// accumulated over frames they are exact.
     pub rays: u32,
     /// Widest radius of a penumbra in image space, pixels. Higher lets large lamps cast penumbrae as wide as they are, with more
     /// grain and fetches further apart; lower cuts them.
@@ -118,9 +119,10 @@ pub struct SoftShadowSettings {
 }
 
 impl Default for SoftShadowSettings {
-    /// "4 + 5" of the paper's Table 1. `docs/shadows.md` measures what other taps are worth. Grain goes by the number of taps and not by
-    /// how far apart they are, so that the widest radius only bounds how scattered fetches are; a quarter of a 512-pixel image
-    /// leaves common penumbrae alone. The error is the same for any range scale from 0.05 to 1; one in the middle.
+    /// "4 + 5" of the paper's Table 1. `docs/shadows.md` measures what other taps are worth. Grain goes by the number of taps
+    /// and not by how far apart they are, so that the widest radius only bounds how scattered fetches are; a quarter of a
+    /// 512-pixel image leaves common penumbrae alone. The error is the same for any range scale from 0.05 to 1; one in the
+    /// middle.
     fn default() -> Self {
         Self {
             method: ShadowMethod::default(),
@@ -138,7 +140,8 @@ impl Default for SoftShadowSettings {
 
 impl SoftShadowSettings {
     /// `Pcss` with 64 taps of search and 128 of filtering: a third to two thirds of the default's error, for some three times its
-    /// time; as much error where occluders stand behind each other, where light grazes and inside of a lampshade (`docs/shadows.md`).
+    /// time; as much error where occluders stand behind each other, where light grazes and inside of a lampshade
+    /// (`docs/shadows.md`).
     pub fn accurate() -> Self {
         Self {
             method: ShadowMethod::Pcss,

@@ -1,15 +1,16 @@
 //! Surface lights to pixels: the irradiance that they give to what the eye sees, with or without shadows.
 //!
-//! Inputs: [`GBuffer`], [`SurfaceLights`], and for shadows what a tracer says of [`SurfaceRays`]. Output: [`Irradiance`], at all pixels or at
-//! some. E = Σ Φ cosθ cosθ′ / (π r² + A): of a light as the disc of the surface that it stands for ([`LightShape::Disc`]), exact on
-//! the disc's axis, or without A as a point ([`LightShape::Point`]), the paper's formula, whose spike is as high as a light is near. Without shadows in
-//! three forms ([`LightForm`]) that give the same; with shadows ([`IndirectShadows`]) by rays: [`SurfaceLightShading::record_rays`], a tracer, then
+//! Inputs: [`GBuffer`], [`SurfaceLights`], and for shadows what a tracer says of [`SurfaceRays`]. Output: [`Irradiance`], at
+//! all pixels or at some. E = Σ Φ cosθ cosθ′ / (π r² + A): of a light as the disc of the surface that it stands for
+//! ([`LightShape::Disc`]), exact on the disc's axis, or without A as a point ([`LightShape::Point`]), the paper's formula,
+//! whose spike is as high as a light is near. Without shadows in three forms ([`LightForm`]) that give the same; with shadows
+//! ([`IndirectShadows`]) by rays: [`SurfaceLightShading::record_rays`], a tracer, then
 //! [`SurfaceLightShading::record_shadowed`].
 //!
 //! A light counts within a ball: its irradiance is above a threshold e within r₀ √cosθ′ of it, r₀ = √(Φ/(π e)); the ball around
-//! that region has radius 0.6204 r₀ and stands 0.4387 r₀ along the normal. (The paper's is 2.6 times as wide, around the light.) Source:
-//! photon streaming with virtual surface lights, sections 0.4.1, 0.6 and 0.7.3. Cost: pixels × lights that reach their tile; with shadows,
-//! pixels × rays. Limits: lights are diffuse, and so are receivers.
+//! that region has radius 0.6204 r₀ and stands 0.4387 r₀ along the normal. (The paper's is 2.6 times as wide, around the
+//! light.) Source: photon streaming with virtual surface lights, sections 0.4.1, 0.6 and 0.7.3. Cost: pixels × lights that
+//! reach their tile; with shadows, pixels × rays. Limits: lights are diffuse, and so are receivers.
 
 pub(crate) mod rays;
 
@@ -70,7 +71,8 @@ pub(crate) const DRAW_SLOTS: [Slot; 8] = [
 pub enum LightShape {
     /// A point: as bright as one likes near by.
     Point = 0,
-    /// A disc of as much surface as it stands for: at most as bright as that surface. Of lights at impacts, which stand for none, a point.
+    /// A disc of as much surface as it stands for: at most as bright as that surface. Of lights at impacts, which stand for
+    /// none, a point.
     Disc = 1,
     /// A square of as much surface, by Lambert's formula, within five of its sides.
     #[default]
@@ -188,9 +190,9 @@ pub struct SurfaceLightShadingInputs<'a> {
 /// A band of a view's rays.
 #[derive(Debug, Clone, Copy)]
 pub struct SurfaceLightRays<'a> {
-    /// Room for the rays of the band's pixels, [`SurfaceLightShading::rays_a_pixel`] each; where there is less room pixels have fewer, or
-    /// no shadows. The first step writes them, a tracer says what they meet, the second step reads that. What is left over is not
-    /// written.
+    /// Room for the rays of the band's pixels, [`SurfaceLightShading::rays_a_pixel`] each; where there is less room pixels have
+    /// fewer, or no shadows. The first step writes them, a tracer says what they meet, the second step reads that. What is left
+    /// over is not written.
     pub rays: &'a SurfaceRays,
     /// Which rows of the irradiance, as first row and number. Each band of a submission needs resources of its own.
     pub rows: [u32; 2],
