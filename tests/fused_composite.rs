@@ -17,12 +17,12 @@ fn settings(overrides: &[(&str, &str)]) -> Settings {
     let mut settings = Settings {
         photons: 5000,
         shadow_map_size: 128,
-        env_map_size: 32,
         environment_suns: 4,
         ..Settings::fast()
     };
     settings.set("caustic.photons", "2000").unwrap();
     settings.set("soft_shadow.method", "disc").unwrap();
+    settings.set("tracer.kind", "bvh").unwrap();
     for (name, value) in overrides {
         settings.set(name, value).unwrap();
     }
