@@ -22,8 +22,7 @@ use super::surface_light_scene::SurfaceLightScene;
 use super::{IndirectMethod, LightPlacement, Plan, Settings, Stage};
 use crate::pass::{
     Composite, CompositeInputs, CompositeResources, CompositeSettings, CoverageMeasure, EnvMapSelector,
-    FusedCompositeInputs, GBufferCapture, GBufferCaptureInputs, IndirectShadows, PathShape, PhotonSplatter,
-    PhotonSplatterResources,
+    FusedCompositeInputs, GBufferCapture, GBufferCaptureInputs, PathShape, PhotonSplatter, PhotonSplatterResources,
 };
 #[cfg(feature = "bvh")]
 use crate::resource::BvhGeometry;
@@ -700,7 +699,7 @@ impl GiRenderer {
         let is_on = |stage| self.plan().is_some_and(|p| p.is_on(stage));
         let traces = self.settings.tracer_kind.uses_triangles();
         let shades = self.settings.soft_shadow.uses_triangles();
-        let lights_throw_shadows = self.settings.surface_lights.shading.shadows != IndirectShadows::Off;
+        let lights_throw_shadows = self.settings.surface_lights.shading.shadows != crate::pass::IndirectShadows::Off;
         let (stage, remedy) = match () {
             () if traces && is_on(Stage::FinalGather) => ("FinalGather", NO_RAYS),
             () if traces && lights_throw_shadows && is_on(Stage::SurfaceLightShading) => {
