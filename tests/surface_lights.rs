@@ -774,3 +774,30 @@ fn photons_of_the_processor_bring_the_same_light() {
     }
     assert_no_errors(&gpu);
 }
+
+#[test]
+fn shadows_come_by_whatever_traces_and_ambient_occlusion_stands_in_for_them() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::cornell(0.0);
+    let by = |tracer: &str, shadows: &str| {
+        let settings = settings(&[
+            ("tracer.kind", tracer),
+            ("env_maps.size", "64"),
+            ("surface_lights.places", "100"),
+            ("surface_lights.shadows", shadows),
+            ("surface_lights.rays", "32"),
+        ]);
+        picture(&gpu, &scene, &settings)
+    };
+    let (triangles, maps) = (by("bvh", "all"), by("image-space", "all"));
+    let (off, ambient) = (by("bvh", "off"), by("bvh", "ambient-occlusion"));
+    let means = [&triangles, &maps, &off, &ambient].map(|p| mean(p));
+    println!(
+        "triangles {:.4}, maps {:.4}, off {:.4}, ambient occlusion {:.4}",
+        means[0], means[1], means[2], means[3]
+    );
+    assert!((means[1] / means[0] - 1.0).abs() < 0.03, "{means:?}");
+    // It takes light away, though not all.
+    assert!(means[3] < means[2] && means[3] > 0.5 * means[0], "{means:?}");
+    assert_no_errors(&gpu);
+}
