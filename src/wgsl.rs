@@ -423,7 +423,7 @@ pub(crate) const PHOTON_STREAM_AT_IMPACTS: &str = compose![
 
 pub(crate) const SURFACE_LIGHT_LOOP: &str = compose![
     "pass/surface_light_shading/loop_lights.wgsl",
-    "pass/surface_light_shading/shade_bindings.wgsl",
+    "pass/surface_light_shading/bindings.wgsl",
     "pass/surface_light_shading/params.wgsl",
     "common/surface_light.wgsl",
     "common/polygon.wgsl",
@@ -437,7 +437,7 @@ pub(crate) const SURFACE_LIGHT_LOOP: &str = compose![
 
 pub(crate) const SURFACE_LIGHT_TILES: &str = compose![
     "pass/surface_light_shading/tile_lights.wgsl",
-    "pass/surface_light_shading/shade_bindings.wgsl",
+    "pass/surface_light_shading/bindings.wgsl",
     "pass/surface_light_shading/params.wgsl",
     "common/surface_light.wgsl",
     "common/polygon.wgsl",
@@ -451,6 +451,7 @@ pub(crate) const SURFACE_LIGHT_TILES: &str = compose![
 
 pub(crate) const SURFACE_LIGHT_DRAW: &str = compose![
     "pass/surface_light_shading/draw_lights.wgsl",
+    "pass/surface_light_shading/bindings.wgsl",
     "pass/surface_light_shading/params.wgsl",
     "common/surface_light.wgsl",
     "common/polygon.wgsl",
@@ -465,6 +466,7 @@ pub(crate) const SURFACE_LIGHT_DRAW: &str = compose![
 pub(crate) const SURFACE_LIGHT_SPREAD: &str = compose![
     "pass/surface_light_shading/spread_rays.wgsl",
     "pass/surface_light_shading/shadow_rays.wgsl",
+    "pass/surface_light_shading/bindings.wgsl",
     "pass/surface_light_shading/params.wgsl",
     "common/surface_light.wgsl",
     "common/polygon.wgsl",
@@ -483,6 +485,7 @@ pub(crate) const SURFACE_LIGHT_SPREAD: &str = compose![
 pub(crate) const SURFACE_LIGHT_SUM: &str = compose![
     "pass/surface_light_shading/sum_rays.wgsl",
     "pass/surface_light_shading/shadow_rays.wgsl",
+    "pass/surface_light_shading/bindings.wgsl",
     "pass/surface_light_shading/params.wgsl",
     "common/surface_light.wgsl",
     "common/polygon.wgsl",

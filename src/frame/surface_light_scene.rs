@@ -22,7 +22,7 @@ pub(super) struct SurfaceLightScene {
     sample_offset: u32,
     /// Paths until all are of this revision.
     left: u32,
-    /// Whether a light did, this frame.
+    /// Whether a light moved, this frame.
     has_moved: bool,
 }
 

@@ -1,14 +1,5 @@
 // A rectangle around each light's ball of influence, added up by the raster units.
 
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> view: View;
-@group(0) @binding(2) var depth_texture: texture_2d<f32>;
-@group(0) @binding(3) var normal_texture: texture_2d<f32>;
-@group(0) @binding(4) var base_color_texture: texture_2d<f32>;
-@group(0) @binding(5) var surface_texture: texture_2d<u32>;
-@group(0) @binding(6) var<storage, read> lights: array<SurfaceLight>;
-@group(0) @binding(7) var<storage, read> flux: array<vec4u>;
-
 struct Corner {
     @builtin(position) clip: vec4f,
     @location(0) @interpolate(flat) light: u32,
@@ -45,7 +36,7 @@ fn vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) light: u3
 
 @fragment
 fn fragment(corner: Corner) -> @location(0) vec4f {
-    let receiver = receiver_at(subsampling_pixel(vec2u(corner.clip.xy), params.factor, view.size));
+    let receiver = receiver_of(vec2u(corner.clip.xy));
     if !receiver.is_seen {
         discard;
     }

@@ -1,5 +1,7 @@
 // All lights at every pixel.
 
+@group(0) @binding(8) var irradiance: texture_storage_2d<rgba32float, write>;
+
 @compute @workgroup_size(8, 8)
 fn loop_lights(@builtin(global_invocation_id) id: vec3u) {
     if any(id.xy >= subsampling_size(view.size, params.factor)) {

@@ -29,6 +29,14 @@ fn pixel_random(pixel: vec2u) -> vec2f {
     return vec2f(word.xy >> vec2u(8u)) * 0x1p-24;
 }
 
+// Where the scale ends that rays to some lights have their places on; rays to all have none.
+fn scale_of_rays(receiver: Receiver) -> f32 {
+    if params.shadows != SHADOWS_SOME {
+        return 0.0;
+    }
+    return luminance(unshadowed(receiver));
+}
+
 // The place on the scale from 0 to all light that ray i asks about: one in each of as many equal parts.
 fn ray_place(i: u32, all: f32, random: f32) -> f32 {
     return (f32(i) + random) / f32(params.ray_count) * all;

@@ -1,13 +1,5 @@
 // Rays from what pixels see to lights, or all around: one invocation a pixel.
 
-@group(0) @binding(0) var<uniform> params: Params;
-@group(0) @binding(1) var<uniform> view: View;
-@group(0) @binding(2) var depth_texture: texture_2d<f32>;
-@group(0) @binding(3) var normal_texture: texture_2d<f32>;
-@group(0) @binding(4) var base_color_texture: texture_2d<f32>;
-@group(0) @binding(5) var surface_texture: texture_2d<u32>;
-@group(0) @binding(6) var<storage, read> lights: array<SurfaceLight>;
-@group(0) @binding(7) var<storage, read> flux: array<vec4u>;
 @group(0) @binding(8) var<storage, read_write> rays: array<SurfaceRay>;
 
 fn ray_to(index: u32, receiver: Receiver) -> SurfaceRay {
@@ -17,7 +9,7 @@ fn ray_to(index: u32, receiver: Receiver) -> SurfaceRay {
 
 // Rays that ask about lights; how many there are.
 fn spread_to_lights(receiver: Receiver, pixel: vec2u, first: u32) -> u32 {
-    let all = luminance(unshadowed(receiver));
+    let all = scale_of_rays(receiver);
     let random = pixel_random(pixel).x;
     var passed = 0.0;
     var ray = 0u;
@@ -49,7 +41,7 @@ fn spread_rays(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let pixel = vec2u(id.x, params.first_row + id.y);
-    let receiver = receiver_at(subsampling_pixel(pixel, params.factor, view.size));
+    let receiver = receiver_of(pixel);
     let first = params.ray_count * (id.y * width + id.x);
     var ray = 0u;
     if receiver.is_seen && params.shadows == SHADOWS_AMBIENT {

@@ -1,6 +1,8 @@
 // At every pixel the lights that may reach its tile: a workgroup a tile marks them, then each pixel goes through the marks, in
 // the order of the lights.
 
+@group(0) @binding(8) var irradiance: texture_storage_2d<rgba32float, write>;
+
 const LANES: u32 = 64u;
 // Lights whose marks are held at once.
 const BATCH: u32 = 1024u;

@@ -41,7 +41,7 @@ pub(crate) mod gpu {
     }
 }
 
-/// Bindings of `shaders/pass/surface_light_shading/shade_bindings.wgsl`, in order.
+/// Bindings of `shaders/pass/surface_light_shading/loop_lights.wgsl` and `tile_lights.wgsl`, in order.
 pub(crate) const SHADE_SLOTS: [Slot; 9] = [
     Slot::Uniform,
     Slot::Uniform,

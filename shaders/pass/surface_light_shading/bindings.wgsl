@@ -1,4 +1,4 @@
-// What the forms in compute bind.
+// What all steps bind first.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> view: View;
@@ -8,7 +8,6 @@
 @group(0) @binding(5) var surface_texture: texture_2d<u32>;
 @group(0) @binding(6) var<storage, read> lights: array<SurfaceLight>;
 @group(0) @binding(7) var<storage, read> flux: array<vec4u>;
-@group(0) @binding(8) var irradiance: texture_storage_2d<rgba32float, write>;
 
 // The receiver of a pixel of the irradiance.
 fn receiver_of(id: vec2u) -> Receiver {
