@@ -126,7 +126,7 @@ fn impacts_per_second(gpu: &Gpu, name: &str) -> Result<(f64, f64), String> {
             }
             None => 0.0,
         };
-        let feeder = PhotonFeeder::new(settings.surface_lights.stream, settings.bounces - 1, 2);
+        let feeder = PhotonFeeder::new(settings.surface_lights.stream, settings.walked_bounces(), 2);
         if let Some(frame) = offline.renderer.frame() {
             feeder.set_scene(frame, &Arc::new(scene.clone()));
         }

@@ -315,7 +315,7 @@ fn twins() -> Vec<Twin> {
             factor, ray_count, first_row, row_count, sample_offset, map_count, map_size,
         }),
         twin!(wgsl::IRRADIANCE_FILTER, "Params", irradiance_filter::gpu::Params {
-            factor, radius, normal_agreement, plane_distance,
+            factor, radius, normal_agreement, plane_distance, plus_factor,
         }),
         twin!(wgsl::STABLE_SORT, "SortParams", stable_sort::gpu::SortParams { count, blocks, shift, row }),
         twin!(wgsl::PHOTON_SPLATTER_QUADS, "RasterParams", raster::gpu::RasterParams {
@@ -504,6 +504,7 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "GlossyLight" => vec![&glossy_light::SLOTS],
         "EnvMapLighting" => vec![&env_map_lighting::SLOTS],
         "PhotonStream" => vec![&photon_stream::STREAM_SLOTS],
+        "PhotonStream near" => vec![&photon_stream::NEAR_SLOTS],
         "PhotonStream places" => vec![&photon_stream::PLACE_SLOTS],
         "PhotonStream at impacts" => vec![&photon_stream::IMPACT_SLOTS],
         "SurfaceLightShading loop" | "SurfaceLightShading tiles" => vec![&surface_light_shading::SHADE_SLOTS],

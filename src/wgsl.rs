@@ -397,11 +397,22 @@ pub(crate) const PHOTON_STREAM: &str = compose![
     "pass/photon_stream/stream_impacts.wgsl",
     "pass/photon_stream/impact.wgsl",
     "pass/photon_stream/nearest_light.wgsl",
+    "pass/photon_stream/exitant_flux.wgsl",
     "pass/photon_stream/params.wgsl",
     "common/surface_light.wgsl",
     "common/photon.wgsl",
     "common/octahedral.wgsl",
     "common/reflectance.wgsl",
+    "common/hash.wgsl",
+];
+
+pub(crate) const PHOTON_STREAM_NEAR: &str = compose![
+    "pass/photon_stream/keep_near.wgsl",
+    "pass/photon_stream/impact.wgsl",
+    "pass/photon_stream/params.wgsl",
+    "common/surface_light.wgsl",
+    "common/photon.wgsl",
+    "common/octahedral.wgsl",
     "common/hash.wgsl",
 ];
 
@@ -413,6 +424,7 @@ pub(crate) const PHOTON_STREAM_PLACES: &str = compose![
 
 pub(crate) const PHOTON_STREAM_AT_IMPACTS: &str = compose![
     "pass/photon_stream/lights_at_impacts.wgsl",
+    "pass/photon_stream/exitant_flux.wgsl",
     "pass/photon_stream/params.wgsl",
     "common/surface_light.wgsl",
     "common/photon.wgsl",
@@ -984,6 +996,7 @@ pub const MODULES: &[(&str, &str)] = &[
     ("GlossyLight", GLOSSY_LIGHT),
     ("EnvMapLighting", ENV_MAP_LIGHTING),
     ("PhotonStream", PHOTON_STREAM),
+    ("PhotonStream near", PHOTON_STREAM_NEAR),
     ("PhotonStream places", PHOTON_STREAM_PLACES),
     ("PhotonStream at impacts", PHOTON_STREAM_AT_IMPACTS),
     ("SurfaceLightShading loop", SURFACE_LIGHT_LOOP),

@@ -434,6 +434,7 @@ fn the_filter_keeps_even_light_and_edges_and_evens_out_noise() {
             g_buffer: &g_buffer,
             subsampling: Subsampling::Full,
             estimate: &estimate,
+            plus: None,
             irradiance: &irradiance,
             settings: &IrradianceFilterSettings {
                 radius,

@@ -228,6 +228,106 @@ fn impacts_go_to_the_nearest_light_that_faces_the_same_way() {
     assert_no_errors(&gpu);
 }
 
+#[test]
+fn what_is_kept_near_by_is_what_discs_lose() {
+    let Some(gpu) = gpu() else { return };
+    let (device, queue) = (&gpu.device, &gpu.queue);
+    const PATHS: u32 = 20_000;
+    const BOUNCES: u32 = 3;
+    let mut random = Random(11);
+    let photons = Photons::new(device, PATHS, BOUNCES).unwrap();
+    let all: Vec<Photon> = (0..photons.slots()).map(|_| random.photon(1e-4)).collect();
+    queue.write_buffer(photons.buffer(), 0, bytemuck::cast_slice(&all));
+    let mut lights = SurfaceLights::new(device, 40, BOUNCES).unwrap();
+    lights.write(queue, &unit_frame(), &random.places(40)).unwrap();
+    // Half of it is other, older paths': none.
+    let mut pool = PhotonPool::new(device, 2 * PATHS, BOUNCES).unwrap();
+    assert!(pool.near().is_none());
+    pool.keep_near(device).unwrap();
+    let mut encoder = device.create_command_encoder(&Default::default());
+    let mut inputs = PhotonStreamInputs {
+        queue,
+        photons: &photons,
+        pool: &mut pool,
+        lights: &lights,
+        timestamps: None,
+    };
+    let mut own = PhotonStreamResources::new(device).unwrap();
+    PhotonStream::new(device)
+        .record(&mut encoder, &mut own, &mut inputs)
+        .unwrap();
+    queue.submit([encoder.finish()]);
+    let impacts = read_pool(&gpu, &pool);
+    let near: Vec<Photon> = read_buffer_blocking(device, queue, pool.near().unwrap().buffer()).unwrap();
+    assert_eq!(near.len(), 2 * PATHS as usize);
+    // What discs of an area of 0.02 lose of each hop.
+    let lost = |path: usize, hop: usize| {
+        let [before, photon] = [hop - 1, hop].map(|h| &all[h * PATHS as usize + path]);
+        let impact = impacts[(hop - 1) * 2 * PATHS as usize + path];
+        if photon.state & 15 != 1 {
+            return 0.0;
+        }
+        if before.state & 12 != 0 {
+            return 1.0;
+        }
+        let way = Vec3::from(photon.position).distance_squared(Vec3::from(before.position));
+        if impact[1] | impact[2] | impact[3] == 0 {
+            return 0.0;
+        }
+        0.02 / (0.02 + PI * f64::from(way))
+    };
+    let (mut expected, mut found, mut kept) = (0.0, 0.0, 0);
+    for path in 0..PATHS as usize {
+        let hops: Vec<usize> = (1..=BOUNCES as usize).collect();
+        let shares: Vec<f64> = hops.iter().map(|&h| lost(path, h)).collect();
+        let factor = 0.5 * shares.iter().sum::<f64>().max(1.0);
+        for (&hop, share) in hops.iter().zip(&shares) {
+            expected += 0.5 * share * f64::from(all[hop * PATHS as usize + path].flux[0]);
+        }
+        if near[path].state & 3 == 0 {
+            continue;
+        }
+        let is_own = |h: &&usize| all[**h * PATHS as usize + path].position == near[path].position;
+        let hop = *hops.iter().find(is_own).expect("a photon of the path's");
+        assert!(shares[hop - 1] > 0.0);
+        let flux = factor * f64::from(all[hop * PATHS as usize + path].flux[0]);
+        assert!((f64::from(near[path].flux[0]) / flux - 1.0).abs() < 1e-4, "{path}");
+        found += f64::from(near[path].flux[0]);
+        kept += 1;
+    }
+    println!("{found:.5} of {expected:.5}, by {kept} photons of {}", PATHS * BOUNCES);
+    // Three standard deviations of as many.
+    assert!((found / expected - 1.0).abs() < 3.0 / f64::from(kept).sqrt());
+    assert!(near[PATHS as usize..].iter().all(|p| p.state == 0));
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn discs_and_photons_near_by_lose_nothing_and_are_nearer_than_squares() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::cornell(0.0);
+    let by = |shape: &str, near: &str, places: &str| {
+        let overrides = [
+            ("surface_lights.shape", shape),
+            ("surface_lights.near_photons", near),
+            ("surface_lights.places", places),
+            ("surface_lights.shadows", "all"),
+            ("surface_lights.pool", "50000"),
+            ("surface_lights.stream", "10000"),
+            ("splatter.subsampling", "2"),
+        ];
+        picture(&gpu, &scene, &settings(&overrides))
+    };
+    let many = by("square", "off", "2000");
+    let [with, discs, squares] = [("disc", "on"), ("disc", "off"), ("square", "on")].map(|(s, n)| by(s, n, "100"));
+    let losses = [&with, &discs, &squares].map(|p| 1.0 - mean(p) / mean(&many));
+    let errors = [&with, &discs, &squares].map(|p| rms(p, &many) / mean(&many));
+    println!("with photons near by, discs, squares: lost {losses:.3?}, errors {errors:.3?}");
+    assert!(losses[0].abs() < 0.01 && losses[1] > 0.05);
+    assert!(errors[0] < errors[1] && errors[0] < errors[2]);
+    assert_no_errors(&gpu);
+}
+
 fn settings(overrides: &[(&str, &str)]) -> Settings {
     let mut settings = Settings {
         indirect_method: IndirectMethod::SurfaceLights,
@@ -434,8 +534,9 @@ fn light_follows_a_jump_as_fast_as_the_pool_is_replaced() {
 #[test]
 fn rays_to_all_lights_keep_them_behind_walls_and_rays_to_some_agree_in_the_mean() {
     let Some(gpu) = gpu() else { return };
-    let by = |time: f64, shadows: &str, rays: &str| {
+    let with = |time: f64, shadows: &str, rays: &str, near: &str| {
         let settings = settings(&[
+            ("surface_lights.near_photons", near),
             ("surface_lights.shadows", shadows),
             ("surface_lights.places", "200"),
             ("surface_lights.filter_radius", "0"),
@@ -444,6 +545,7 @@ fn rays_to_all_lights_keep_them_behind_walls_and_rays_to_some_agree_in_the_mean(
         ]);
         picture(&gpu, &samples::two_rooms(time), &settings)
     };
+    let by = |time, shadows, rays| with(time, shadows, rays, "off");
     // The eye is in a room without light; the door to the lit one is closed.
     let (off, all) = (by(0.0, "off", "1"), by(0.0, "all", "1"));
     println!("closed: off {:.5}, all {:.5}", mean(&off), mean(&all));
@@ -451,6 +553,13 @@ fn rays_to_all_lights_keep_them_behind_walls_and_rays_to_some_agree_in_the_mean(
         mean(&all) < 1e-3 * mean(&off),
         "light leaks through walls without shadows alone"
     );
+    // Kernels of photons near by lie over the wall's foot, as all do that are splatted, but few photons have them.
+    let near = with(0.0, "all", "1", "on");
+    let mut splatted = settings(&[("photons", "8000"), ("splatter.photons", "150")]);
+    splatted.indirect_method = IndirectMethod::Splatting;
+    let splatted = picture(&gpu, &samples::two_rooms(0.0), &splatted);
+    println!("closed: near {:.5}, splatted {:.5}", mean(&near), mean(&splatted));
+    assert!(mean(&near) < 0.5 * mean(&splatted));
     // And open.
     let (all, some, few) = (by(1.0, "all", "1"), by(1.0, "some", "64"), by(1.0, "some", "4"));
     println!("open: all {:.5}, some {:.5}", mean(&all), mean(&some));
@@ -744,7 +853,7 @@ fn photons_of_the_processor_bring_the_same_light() {
         let mut offline = offline(&gpu, &scene, &settings);
         offline.render_frame(None).unwrap();
         let expected = offline.read().unwrap();
-        let feeder = PhotonFeeder::new(2000, settings.bounces - 1, 2);
+        let feeder = PhotonFeeder::new(2000, settings.walked_bounces(), 2);
         feeder.set_scene(offline.renderer.frame().unwrap(), &Arc::new(scene.clone()));
         offline.renderer.set_photon_feeder(Some(feeder));
         let next = |offline: &Offline<'_>| offline.renderer.photon_pool().unwrap().next();

@@ -210,6 +210,7 @@ fn irradiance_is_neither_interpolated_nor_evened_out_across_numbers() {
             g_buffer: &g_buffer,
             subsampling,
             estimate: &coarse,
+            plus: None,
             irradiance: &filtered,
             settings: &IrradianceFilterSettings {
                 radius: 2,

@@ -8,6 +8,8 @@ struct Params {
     radius: u32,
     normal_agreement: f32,
     plane_distance: f32,
+    // What is added is multiplied by that
+    plus_factor: f32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -17,7 +19,8 @@ struct Params {
 @group(0) @binding(4) var base_color_texture: texture_2d<f32>;
 @group(0) @binding(5) var surface_texture: texture_2d<u32>;
 @group(0) @binding(6) var estimate: texture_2d<f32>;
-@group(0) @binding(7) var irradiance: texture_storage_2d<rgba32float, write>;
+@group(0) @binding(7) var plus: texture_2d<f32>;
+@group(0) @binding(8) var irradiance: texture_storage_2d<rgba32float, write>;
 
 @compute @workgroup_size(8, 8)
 fn filter_pixels(@builtin(global_invocation_id) id: vec3u) {
@@ -26,9 +29,13 @@ fn filter_pixels(@builtin(global_invocation_id) id: vec3u) {
         return;
     }
     let own = textureLoad(estimate, id.xy, 0);
+    var added = vec3f(0.0);
+    if params.plus_factor > 0.0 {
+        added = params.plus_factor * textureLoad(plus, id.xy, 0).rgb;
+    }
     let pixel = subsampling_pixel(id.xy, params.factor, view.size);
     if !bilateral_is_surface(pixel) {
-        textureStore(irradiance, id.xy, own);
+        textureStore(irradiance, id.xy, vec4f(own.rgb + added, own.a));
         return;
     }
     let receiver = bilateral_receiver(pixel);
@@ -51,5 +58,5 @@ fn filter_pixels(@builtin(global_invocation_id) id: vec3u) {
             }
         }
     }
-    textureStore(irradiance, id.xy, vec4f(sum.rgb / sum.a, own.a));
+    textureStore(irradiance, id.xy, vec4f(sum.rgb / sum.a + added, own.a));
 }

@@ -589,8 +589,8 @@ impl GiRenderer {
 
     /// Takes the photons of surface lights from threads of the processor instead of tracers on the GPU; `None`: from tracers
     /// again. The host tells it of scenes ([`PhotonFeeder::set_scene`]). In frames that find no batch ready, the pool stays as
-    /// it was. Of [`SurfaceLightSettings::stream`](super::SurfaceLightSettings::stream) paths, and one bounce less than
-    /// [`Settings::bounces`]. Returns the one before.
+    /// it was. Of [`SurfaceLightSettings::stream`](super::SurfaceLightSettings::stream) paths of
+    /// [`Settings::walked_bounces`]. Returns the one before.
     #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
     pub fn set_photon_feeder(&mut self, feeder: Option<PhotonFeeder>) -> Option<PhotonFeeder> {
         self.revision += 1;

@@ -109,7 +109,7 @@ impl ViewPasses {
         Ok(Self {
             photon_splatter: PhotonSplatter::new(device, &settings.splatter_config)?,
             final_gather: gathers.then(|| FinalGather::new(device)),
-            irradiance_filter: (settings.filter_radius() > 0).then(|| IrradianceFilter::new(device)),
+            irradiance_filter: settings.filters().then(|| IrradianceFilter::new(device)),
             surface_light_shading: (settings.indirect_method == IndirectMethod::SurfaceLights)
                 .then(|| SurfaceLightShading::new(device)),
             upsampler: Upsampler::new(device),
@@ -152,7 +152,10 @@ impl IndirectView {
             let noisy = Irradiance::new(device, estimated, format)?;
             Ok((noisy, IrradianceFilterResources::new(device)?))
         };
-        let filter = (settings.filter_radius() > 0).then(filter).transpose()?;
+        let filter = settings.filters().then(filter).transpose()?;
+        if filter.is_some() {
+            format = wgpu::TextureFormat::Rgba32Float;
+        }
         let estimated = Irradiance::new(device, estimated, format)?;
         let by_levels = settings.upsampling == Upsampling::ByLevels;
         let mut levels = Vec::new();
@@ -192,7 +195,7 @@ impl IndirectView {
         scene: &IndirectScene,
     ) -> Result<(), Error> {
         if let (Estimate::SurfaceLights(own), Some(lights)) = (&mut self.estimate, scene.surface_lights()) {
-            own.follow(device, settings, lights.lights(), self.estimated.size())?;
+            own.follow(device, settings, lights, self.estimated.size())?;
         }
         Ok(())
     }
@@ -231,11 +234,17 @@ impl IndirectView {
         let (Some(pass), Some((noisy, own))) = (&inputs.passes.0.irradiance_filter, &mut self.filter) else {
             return;
         };
+        let near = match &self.estimate {
+            Estimate::SurfaceLights(own) => own.near(),
+            Estimate::Splatting(_) | Estimate::FinalGather(_) => None,
+        };
+        let plus = near.zip(inputs.scene.surface_lights().map(|s| s.share().recip()));
         let filter_inputs = IrradianceFilterInputs {
             queue: inputs.view.queue,
             g_buffer: inputs.g_buffer,
             subsampling: inputs.settings.subsampling,
             estimate: noisy,
+            plus,
             irradiance: &self.estimated,
             settings: &IrradianceFilterSettings {
                 radius: inputs.settings.filter_radius(),

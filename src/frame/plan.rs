@@ -294,6 +294,7 @@ fn estimates(indirect: &(bool, String), settings: &Settings) -> Estimates {
         }),
         filtering: match settings.filter_radius() {
             _ if settings.indirect_method == IndirectMethod::Splatting => off("no noise of rays"),
+            0 if settings.keeps_near() && indirect.0 => (true, "adds the photons near by".to_owned()),
             0 => off("settings leave the noise of rays"),
             radius => (
                 indirect.0,
@@ -326,6 +327,9 @@ fn estimates(indirect: &(bool, String), settings: &Settings) -> Estimates {
                 IndirectShadows::All => "shadows by a ray to each".to_owned(),
             };
             all.streaming = (true, pool);
+            if settings.keeps_near() {
+                all.splatting = (true, "photons near by, beside surface lights".to_owned());
+            }
             all.shading = (true, format!("{} places, {shadows}", lights.places));
         }
     }

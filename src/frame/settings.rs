@@ -83,6 +83,11 @@ pub struct SurfaceLightSettings {
     pub placement: LightPlacement,
     /// How they come to pixels.
     pub shading: SurfaceLightShadingSettings,
+    /// Whether photons that came a short way are splatted beside them, for what discs ([`LightShape::Disc`]) lose near by, and all that
+    /// came by way of metal and glass. Other shapes, and lights at impacts, have none.
+    pub near_photons: bool,
+    /// Photons under a kernel of these, above 0: among as many as the pool has paths. Fewer keep corners sharper and are noisier.
+    pub near_kernel: f32,
     /// Estimated pixels to each side that the noise of [`IndirectShadows::Some`] is evened out over, 0 to 16.
     pub filter_radius: u32,
 }
@@ -94,7 +99,12 @@ impl Default for SurfaceLightSettings {
             pool: 100_000,
             stream: 5000,
             placement: LightPlacement::default(),
-            shading: SurfaceLightShadingSettings::default(),
+            shading: SurfaceLightShadingSettings {
+                shape: LightShape::Disc,
+                ..Default::default()
+            },
+            near_photons: true,
+            near_kernel: 150.0,
             filter_radius: 1,
         }
     }
@@ -434,12 +444,28 @@ impl Settings {
         }
     }
 
-    /// Surfaces that photons scatter at: of surface lights the last one shines by itself.
-    pub(super) fn walked_bounces(&self) -> u32 {
+    /// Surfaces that photons scatter at, for a [`PhotonFeeder`](super::PhotonFeeder): of surface lights the last one shines by itself,
+    /// unless photons near by are kept.
+    pub fn walked_bounces(&self) -> u32 {
         match self.indirect_method {
-            IndirectMethod::SurfaceLights => self.bounces.saturating_sub(1),
+            IndirectMethod::SurfaceLights if !self.keeps_near() => self.bounces.saturating_sub(1),
             _ => self.bounces,
         }
+    }
+
+    /// Whether photons that came a short way stand in for what surface lights lose there.
+    pub(super) fn keeps_near(&self) -> bool {
+        let own = &self.surface_lights;
+        self.indirect_method == IndirectMethod::SurfaceLights
+            && own.placement == LightPlacement::OnSurfaces
+            && own.shading.shape == LightShape::Disc
+            && own.near_photons
+            && self.bounces > 0
+    }
+
+    /// Whether the estimate of indirect light goes through a filter, if only to be added to.
+    pub(super) fn filters(&self) -> bool {
+        self.filter_radius() > 0 || self.keeps_near()
     }
 
     /// Estimated pixels to each side that noise is evened out over; 0: it stays.
@@ -779,6 +805,19 @@ const KNOBS: &[Knob] = &[
         ["point", LightShape::Point],
         ["disc", LightShape::Disc],
         ["square", LightShape::Square]
+    ),
+    choice!(
+        "surface_lights.near_photons",
+        "on or off",
+        surface_lights.near_photons,
+        ["on", true],
+        ["off", false]
+    ),
+    field!(
+        "surface_lights.near_kernel",
+        "above 0: photons under a kernel",
+        surface_lights.near_kernel,
+        |v: f32| v > 0.0 && v.is_finite()
     ),
     choice!(
         "surface_lights.form",

@@ -5,7 +5,7 @@ use super::traced_photons::{TracedPhotons, WalkInputs};
 use super::{LightPlacement, Settings};
 use crate::Error;
 use crate::pass::{ImpactLightInputs, PhotonStreamInputs, PhotonStreamResources};
-use crate::resource::{PhotonPool, SurfaceLights};
+use crate::resource::{PhotonPool, Photons, SurfaceLights};
 use crate::scene::{SurfacePlace, UnitFrame};
 
 /// Allocated while indirect light comes from surface lights.
@@ -28,10 +28,17 @@ pub(super) struct SurfaceLightScene {
 
 impl SurfaceLightScene {
     pub(super) fn new(device: &wgpu::Device, settings: &Settings) -> Result<Self, Error> {
-        let hops = settings.walked_bounces() + 1;
+        let keeps_near = settings.keeps_near();
+        let hops = settings.walked_bounces() + u32::from(!keeps_near);
         let own = &settings.surface_lights;
         let (places, pool) = match own.placement {
-            LightPlacement::OnSurfaces => (own.places, Some(PhotonPool::new(device, settings.pool_paths(), hops)?)),
+            LightPlacement::OnSurfaces => {
+                let mut pool = PhotonPool::new(device, settings.pool_paths(), hops)?;
+                if keeps_near {
+                    pool.keep_near(device)?;
+                }
+                (own.places, Some(pool))
+            }
             // Two lights a place.
             LightPlacement::AtImpacts => ((settings.traced_photons() * hops).div_ceil(2), None),
         };
@@ -147,6 +154,11 @@ impl SurfaceLightScene {
 
     pub(super) fn pool(&self) -> Option<&PhotonPool> {
         self.pool.as_ref()
+    }
+
+    /// What lights lose near by, if it is kept.
+    pub(super) fn near_photons(&self) -> Option<&Photons> {
+        self.pool.as_ref().and_then(PhotonPool::near)
     }
 
     pub(super) fn memory_use(&self) -> u64 {

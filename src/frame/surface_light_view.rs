@@ -1,13 +1,17 @@
-//! What a view has of surface lights: their irradiance, with the rays of its shadows.
+//! What a view has of surface lights: their irradiance, with the rays of its shadows, and that of photons near by.
 
 use super::Settings;
 use super::indirect_view::{IndirectViewInputs, MOST_RAYS, RayTracers, ViewTracers};
+use super::surface_light_scene::SurfaceLightScene;
 use crate::Error;
 use crate::pass::{
-    IndirectShadows, LightForm, SurfaceLightRays, SurfaceLightShading, SurfaceLightShadingInputs,
-    SurfaceLightShadingResources,
+    Bandwidth, IndirectShadows, LightForm, PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings,
+    SurfaceLightRays, SurfaceLightShading, SurfaceLightShadingInputs, SurfaceLightShadingResources, progressive_scale,
 };
-use crate::resource::{Irradiance, SurfaceLights, SurfaceRays};
+use crate::resource::{Irradiance, Photons, SurfaceRays};
+
+/// Range of the density of photons near by over that of as many spread evenly over all surfaces.
+const DENSITY_RANGE: [f32; 2] = [0.25, 1.0];
 
 /// Allocated while indirect light comes from surface lights.
 #[derive(Debug)]
@@ -15,6 +19,15 @@ pub(super) struct SurfaceLightView {
     own: SurfaceLightShadingResources,
     /// If they throw shadows.
     shadows: Option<Shadows>,
+    /// If photons are kept that came a short way.
+    near: Option<NearPhotons>,
+}
+
+/// What lights lose near by.
+#[derive(Debug)]
+struct NearPhotons {
+    splatter: PhotonSplatterResources,
+    irradiance: Irradiance,
 }
 
 #[derive(Debug)]
@@ -33,6 +46,7 @@ impl SurfaceLightView {
         Ok(Self {
             own: SurfaceLightShadingResources::new(device)?,
             shadows: None,
+            near: None,
         })
     }
 
@@ -46,15 +60,21 @@ impl SurfaceLightView {
         }
     }
 
-    /// Makes or drops what shadows need: room for the rays of a band of `size` pixels' rows.
+    /// Makes or drops what shadows need, room for the rays of a band of `size` pixels' rows, and what photons near by do.
     pub(super) fn follow(
         &mut self,
         device: &wgpu::Device,
         settings: &Settings,
-        lights: &SurfaceLights,
+        scene: &SurfaceLightScene,
         size: [u32; 2],
     ) -> Result<(), Error> {
-        let rays = SurfaceLightShading::rays_a_pixel(&settings.surface_lights.shading, lights);
+        if let (None, Some(photons)) = (&self.near, scene.near_photons()) {
+            self.near = Some(NearPhotons {
+                splatter: PhotonSplatterResources::new(device, &settings.splatter_config, photons, size)?,
+                irradiance: Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?,
+            });
+        }
+        let rays = SurfaceLightShading::rays_a_pixel(&settings.surface_lights.shading, scene.lights());
         if rays == 0 {
             self.shadows = None;
         } else if self.shadows.as_ref().is_none_or(|s| s.rays_a_pixel != rays) {
@@ -86,6 +106,9 @@ impl SurfaceLightView {
             settings: &inputs.settings.surface_lights.shading,
             timestamps: inputs.view.timestamps,
         };
+        if let (Some(near), Some(photons)) = (&mut self.near, scene.near_photons()) {
+            near.record(encoder, photons, inputs);
+        }
         let Some(shadows) = &mut self.shadows else {
             return pass.record(encoder, &mut self.own, &shading_inputs);
         };
@@ -105,12 +128,50 @@ impl SurfaceLightView {
         Ok(())
     }
 
+    /// What is to be added to the irradiance that was recorded.
+    pub(super) fn near(&self) -> Option<&Irradiance> {
+        self.near.as_ref().map(|n| &n.irradiance)
+    }
+
     pub(super) fn memory_use(&self) -> u64 {
+        let near = self.near.as_ref();
+        let near = near.map_or(0, |n| n.splatter.memory_use() + n.irradiance.memory_use());
         let shadows = self.shadows.as_ref().map_or(0, |s| {
             let own: u64 = s.own.iter().map(SurfaceLightShadingResources::memory_use).sum();
             s.rays.memory_use() + own + s.tracers.memory_use()
         });
-        self.own.memory_use() + shadows
+        self.own.memory_use() + shadows + near
+    }
+}
+
+impl NearPhotons {
+    fn record(&mut self, encoder: &mut wgpu::CommandEncoder, photons: &Photons, inputs: &IndirectViewInputs<'_>) {
+        let settings = PhotonSplatterSettings {
+            // The bins of the screen hold few of them, and would say nothing of how dense all photons are.
+            bandwidth: Bandwidth::Density {
+                photons: inputs.settings.surface_lights.near_kernel,
+                clamp: DENSITY_RANGE,
+            },
+            radius_scale: progressive_scale(inputs.view.accumulated, inputs.settings.radius_alpha),
+            ..inputs.settings.splatter
+        };
+        let splatter_inputs = PhotonSplatterInputs {
+            queue: inputs.view.queue,
+            photons,
+            g_buffer: inputs.g_buffer,
+            subsampling: inputs.settings.subsampling,
+            irradiance: &self.irradiance,
+            area: inputs.area,
+            radius: inputs.radius,
+            sample_offset: inputs.sample_offset,
+            settings: &settings,
+            timestamps: inputs.view.timestamps,
+        };
+        inputs
+            .passes
+            .0
+            .photon_splatter
+            .record(encoder, &mut self.splatter, &splatter_inputs);
     }
 }
 

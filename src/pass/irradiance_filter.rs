@@ -3,7 +3,7 @@
 //! Input: [`Irradiance`] of some [`Subsampling`], [`GBuffer`]. Output: [`Irradiance`] (`rgba32float`) of the same size; alpha is
 //! that of the input. Each pixel becomes the mean of those around, which weigh 1 − d² / (r + 1)² at d pixels from it, times how
 //! well their normals agree and how near they lie to its tangent plane, as in [`Upsampler`](super::Upsampler); those of another
-//! surface, by their numbers, do not count. Source: joint bilateral filtering (Petschnigg et al. 2004), with the distance from
+//! surface, by their numbers, do not count. What is smooth already may be added at the same time. Source: joint bilateral filtering (Petschnigg et al. 2004), with the distance from
 //! the plane in the place of depth.
 //!
 //! Cost: pixels × (2 r + 1)², some five texel fetches each. Limits: what is finer than the radius is blurred, contact shadows
@@ -24,17 +24,19 @@ pub(crate) mod gpu {
         pub(crate) radius: u32,
         pub(crate) normal_agreement: f32,
         pub(crate) plane_distance: f32,
+        pub(crate) plus_factor: f32,
     }
 }
 
 /// Bindings of `shaders/pass/irradiance_filter.wgsl`, in order.
-pub(crate) const SLOTS: [Slot; 8] = [
+pub(crate) const SLOTS: [Slot; 9] = [
     Slot::Uniform,
     Slot::Uniform,
     Slot::Texture,
     Slot::Texture,
     Slot::Texture,
     Slot::UintTexture,
+    Slot::Texture,
     Slot::Texture,
     Slot::StorageTexture(wgpu::TextureFormat::Rgba32Float),
 ];
@@ -79,6 +81,8 @@ pub struct IrradianceFilterInputs<'a> {
     pub subsampling: Subsampling,
     /// Of the size that [`Subsampling::size`] makes of the G-buffer's.
     pub estimate: &'a Irradiance,
+    /// What is added to the result as it is, times a factor: of the same size.
+    pub plus: Option<(&'a Irradiance, f32)>,
     /// Written; another texture of the same size, `rgba32float`.
     pub irradiance: &'a Irradiance,
     /// How far.
@@ -119,6 +123,7 @@ impl IrradianceFilter {
             // At 1 no normal would agree with itself. The smaller of NaN and it is it.
             normal_agreement: inputs.settings.normal_agreement.min(0.9999),
             plane_distance: inputs.settings.plane_distance,
+            plus_factor: inputs.plus.map_or(0.0, |plus| plus.1),
         };
         inputs
             .queue
@@ -132,6 +137,8 @@ impl IrradianceFilter {
             (&views.base_color).into(),
             inputs.g_buffer.surfaces().into(),
             inputs.estimate.view().into(),
+            // Not read, if there is nothing to add.
+            inputs.plus.map_or(inputs.estimate, |plus| plus.0).view().into(),
             inputs.irradiance.view().into(),
         ];
         let label = "lightfall::IrradianceFilter";

@@ -95,7 +95,7 @@ impl SortedPhotons {
     /// Photons straight from a light are its direct light on diffuse surfaces.
     fn first_slot(self, photons: &Photons) -> u32 {
         match self {
-            Self::OnDiffuse => photons.count(),
+            Self::OnDiffuse => photons.first_indirect(),
             Self::OnGlossy => 0,
         }
     }

@@ -6,7 +6,8 @@
 //! whole numbers, so that sums never drift, rounded by chance that belongs to the place in the pool.
 //! A light shines from where that of its impacts arrived that is nearest to its place: places may be hidden, and what no light
 //! reaches should not shine (`docs/surface_lights.md`). [`PhotonStream::record_at_impacts`] is instant radiosity (Keller 1997),
-//! the paper's baseline.
+//! the paper's baseline. For what lights that are discs lose near by one photon of a path is kept ([`PhotonPool::keep_near`]): splatted, it
+//! brings that back.
 //!
 //! Cost: impacts of the new paths; of each, the cells of the grid around it up to the nearest light; two looks at each impact
 //! of the pool. Limits: diffuse surfaces alone send light on here; what glossy ones reflect is photons' matter.
@@ -61,6 +62,15 @@ pub(crate) const PLACE_SLOTS: [Slot; 5] = [
     Slot::StorageMut,
 ];
 
+/// Bindings of `shaders/pass/photon_stream/keep_near.wgsl`, in order.
+pub(crate) const NEAR_SLOTS: [Slot; 5] = [
+    Slot::Uniform,
+    Slot::Storage,
+    Slot::Storage,
+    Slot::Storage,
+    Slot::StorageMut,
+];
+
 /// Bindings of `shaders/pass/photon_stream/lights_at_impacts.wgsl`, in order.
 pub(crate) const IMPACT_SLOTS: [Slot; 5] = [
     Slot::Uniform,
@@ -77,6 +87,8 @@ pub struct PhotonStream {
     stream_layout: wgpu::BindGroupLayout,
     impact_layout: wgpu::BindGroupLayout,
     stream: wgpu::ComputePipeline,
+    near_layout: wgpu::BindGroupLayout,
+    keep_near: wgpu::ComputePipeline,
     place_layout: wgpu::BindGroupLayout,
     /// Of each light the nearest impact: how far, which, and so where.
     places: [wgpu::ComputePipeline; 3],
@@ -90,6 +102,7 @@ pub struct PhotonStreamResources {
     place_params: wgpu::Buffer,
     place_groups: BindGroupCache,
     stream_groups: BindGroupCache,
+    near_groups: BindGroupCache,
     impact_groups: BindGroupCache,
 }
 
@@ -128,6 +141,7 @@ impl PhotonStream {
         let stage = wgpu::ShaderStages::COMPUTE;
         let stream_layout = device::layout(device, "lightfall::PhotonStream", stage, &STREAM_SLOTS);
         let impact_layout = device::layout(device, "lightfall::PhotonStream::impacts", stage, &IMPACT_SLOTS);
+        let near_layout = device::layout(device, "lightfall::PhotonStream::near", stage, &NEAR_SLOTS);
         let place_layout = device::layout(device, "lightfall::PhotonStream::places", stage, &PLACE_SLOTS);
         let pipeline = |label, source, entry_point, layout| {
             let spec = ComputeSpec {
@@ -151,6 +165,12 @@ impl PhotonStream {
                 "stream_impacts",
                 &stream_layout,
             ),
+            keep_near: pipeline(
+                "lightfall::PhotonStream::near",
+                wgsl::PHOTON_STREAM_NEAR,
+                "keep_near",
+                &near_layout,
+            ),
             places,
             at_impacts: pipeline(
                 "lightfall::PhotonStream::impacts",
@@ -159,6 +179,7 @@ impl PhotonStream {
                 &impact_layout,
             ),
             stream_layout,
+            near_layout,
             place_layout,
             impact_layout,
         }
@@ -175,7 +196,9 @@ impl PhotonStream {
         inputs: &mut PhotonStreamInputs<'_>,
     ) -> Result<(), Error> {
         let (photons, pool) = (inputs.photons, &mut *inputs.pool);
-        let (paths, hops) = (photons.count(), photons.bounces() + 1);
+        let paths = photons.count();
+        // What arrives last is of use near by alone.
+        let hops = photons.bounces() + u32::from(pool.near().is_none());
         for (what, expected, found, is_bad) in [
             (
                 "photons to stream (most that the pool holds)",
@@ -184,7 +207,7 @@ impl PhotonStream {
                 paths > pool.paths(),
             ),
             (
-                "hops of photons to stream (as many as the pool has)",
+                "hops of photons to stream (as many as the pool has; one more where it keeps those near by)",
                 pool.hops(),
                 hops,
                 hops != pool.hops(),
@@ -198,15 +221,18 @@ impl PhotonStream {
         let (first_path, is_stale) = pool.advance(photons.count());
         if is_stale {
             encoder.clear_buffer(pool.buffer(), 0, None);
+            if let Some(near) = pool.near() {
+                encoder.clear_buffer(near.buffer(), 0, None);
+            }
             inputs.lights.clear_flux(encoder);
         }
         if photons.count() == 0 || inputs.lights.count() == 0 {
             return Ok(());
         }
-        let (groups, row) = dispatch_64(photons.slots());
+        let (groups, row) = dispatch_64(paths * hops);
         let params = gpu::Params {
-            path_count: photons.count(),
-            hop_count: photons.bounces() + 1,
+            path_count: paths,
+            hop_count: hops,
             first_path,
             pool_count: pool.paths(),
             row,
@@ -233,8 +259,37 @@ impl PhotonStream {
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(groups[0], groups[1], 1);
         drop(pass);
+        self.record_near(encoder, resources, inputs, groups);
         self.record_places(encoder, resources, inputs);
         Ok(())
+    }
+
+    /// Records what is kept of new paths near by, behind their exchange and with its uniform.
+    fn record_near(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut PhotonStreamResources,
+        inputs: &PhotonStreamInputs<'_>,
+        groups: [u32; 2],
+    ) {
+        let Some(near) = inputs.pool.near() else {
+            return;
+        };
+        let bound = [
+            (&resources.params).into(),
+            inputs.photons.buffer().into(),
+            inputs.lights.records().into(),
+            inputs.pool.buffer().into(),
+            near.buffer().into(),
+        ];
+        let label = "lightfall::PhotonStream::near";
+        let group = resources
+            .near_groups
+            .get(&self.device, label, &self.near_layout, &bound);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(&self.keep_near);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
     }
 
     /// Records from where lights shine, as `record` does at its end: for frames in which lights moved and no photons are
@@ -339,6 +394,7 @@ impl PhotonStreamResources {
             place_params: device::uniform_buffer::<gpu::PlaceParams>(device, "lightfall::PhotonStream::place_params")?,
             place_groups: BindGroupCache::default(),
             stream_groups: BindGroupCache::default(),
+            near_groups: BindGroupCache::default(),
             impact_groups: BindGroupCache::default(),
         })
     }

@@ -1,5 +1,6 @@
 //! The photons that surface lights are made of: a ring of paths.
 
+use super::Photons;
 use crate::{Error, gpu as device};
 
 pub(crate) mod gpu {
@@ -31,6 +32,8 @@ pub struct PhotonPool {
     /// Paths that were streamed since the last restart.
     streamed: u64,
     is_stale: bool,
+    /// If what discs lose near by is kept.
+    near: Option<Photons>,
 }
 
 impl PhotonPool {
@@ -55,7 +58,27 @@ impl PhotonPool {
             next: 0,
             streamed: 0,
             is_stale: false,
+            near: None,
         })
+    }
+
+    /// Keeps of each path one of the photons that came a short way at most, from now on: for what lights that are discs
+    /// ([`LightShape::Disc`](crate::pass::LightShape::Disc)) lose near by. The photons that are streamed have one hop more then, whose
+    /// light ends there.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`].
+    pub fn keep_near(&mut self, device: &wgpu::Device) -> Result<(), Error> {
+        self.near = Some(Photons::of_indirect_light(device, self.paths)?);
+        self.restart();
+        Ok(())
+    }
+
+    /// What lights that are discs lose near by, one photon a path or none, for
+    /// [`PhotonSplatter`](crate::pass::PhotonSplatter); its irradiance is to be divided by [`PhotonPool::share`], too. `None` unless it is
+    /// kept.
+    pub fn near(&self) -> Option<&Photons> {
+        self.near.as_ref()
     }
 
     /// Empties it with the next photons that are streamed, and takes all flux from the lights: for other lights, or another
@@ -103,6 +126,6 @@ impl PhotonPool {
 
     /// Bytes this resource allocated.
     pub fn memory_use(&self) -> u64 {
-        self.buffer.size()
+        self.buffer.size() + self.near.as_ref().map_or(0, Photons::memory_use)
     }
 }

@@ -161,6 +161,8 @@ pub struct Photons {
     count: u32,
     bounces: u32,
     map: PhotonMap,
+    /// The first slot of indirect light.
+    first_indirect: u32,
     bytes: u64,
 }
 
@@ -194,7 +196,19 @@ impl Photons {
             count,
             bounces,
             map: PhotonMap::All,
+            first_indirect: count,
             bytes,
+        })
+    }
+
+    /// Room for `count` photons of indirect light, one hop each: hop 0 counts in density estimation as later ones do.
+    ///
+    /// # Errors
+    /// As [`Photons::new`].
+    pub(crate) fn of_indirect_light(device: &wgpu::Device, count: u32) -> Result<Self, Error> {
+        Ok(Self {
+            first_indirect: 0,
+            ..Self::new(device, count, 0)?
         })
     }
 
@@ -225,6 +239,7 @@ impl Photons {
             count,
             bounces,
             map: PhotonMap::All,
+            first_indirect: count,
             bytes: 0,
         })
     }
@@ -264,6 +279,11 @@ impl Photons {
     /// Says which paths the tracers walk from now on: at first all.
     pub fn set_map(&mut self, map: PhotonMap) {
         self.map = map;
+    }
+
+    /// The first slot that density estimation reads.
+    pub(crate) fn first_indirect(&self) -> u32 {
+        self.first_indirect
     }
 
     /// Slots over all hops.

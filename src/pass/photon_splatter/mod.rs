@@ -618,9 +618,9 @@ pub(super) fn check_splats(device: &wgpu::Device, slots: u32) -> Result<(), Erro
     TiledBuffers::check(device, slots)
 }
 
-/// All slots but hop 0.
+/// All slots but those of light straight from its source.
 pub(super) fn splatted_slots(photons: &Photons) -> u32 {
-    let slots = photons.slots() - photons.count();
+    let slots = photons.slots() - photons.first_indirect();
     debug_assert!(photons.buffer().size() >= u64::from(photons.slots()) * PHOTON_BYTES);
     slots
 }

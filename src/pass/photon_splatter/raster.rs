@@ -133,7 +133,7 @@ impl Raster {
             clip_scale: [x[0], y[0]],
             // Clip space has +y up, pixels have it down.
             clip_shift: [x[1], -y[1]],
-            first_slot: inputs.photons.count(),
+            first_slot: inputs.photons.first_indirect(),
             slot_count: slots,
             row,
             _pad: 0,

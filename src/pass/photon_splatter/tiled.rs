@@ -190,7 +190,7 @@ impl Tiled {
         let (groups, row) = dispatch_64(slots);
         let params = gpu::TiledParams {
             bandwidth: *bandwidth,
-            first_slot: inputs.photons.count(),
+            first_slot: inputs.photons.first_indirect(),
             slot_count: slots,
             row,
         };
