@@ -6,15 +6,15 @@ use crate::pass::photon_splatter::{raster, tiled};
 use crate::pass::{
     accumulator, composite, depth_hierarchy_build, direct_light, env_map_lighting, env_map_selector, final_gather,
     fused_composite, glossy_light, image_space_tracer, irradiance_filter, nearest_occluder, photon_emitter,
-    photon_grid, photon_guiding, photon_splatter, photon_stream, photon_walk, soft_shadow, specular_paths, stable_sort,
-    surface_light_shading, tone_map, trace_statistics, upsampler,
+    photon_grid, photon_guiding, photon_splatter, photon_stream, photon_walk, selective_emitter, soft_shadow,
+    specular_paths, stable_sort, surface_light_shading, tone_map, trace_statistics, upsampler,
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
 use crate::resource::{
     MAX_LIGHTS, Photon, PhotonMap, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, environment, g_buffer,
-    guiding_tables, lights, lost_rays, marked_pixels, mesh_geometry, pending_penumbrae, photon_pool, photon_targets,
-    surface_lights, view,
+    guiding_tables, lights, marked_pixels, mesh_geometry, path_list, pending_penumbrae, photon_groups, photon_pool,
+    photon_targets, surface_lights, view,
 };
 use crate::scene::Material;
 use crate::wgsl;
@@ -254,7 +254,7 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::IMAGE_SPACE_TRACER, "WalkParams", photon_walk::gpu::WalkParams {
             photon_count, first_hop, last_hop, roulette_from, sample_offset, row, is_shared, map, guided,
         }),
-        twin!(wgsl::IMAGE_SPACE_TRACER_LIST, "LostRays", lost_rays::gpu::LostRays { workgroups, count, paths }),
+        twin!(wgsl::IMAGE_SPACE_TRACER_LIST, "PathList", path_list::gpu::PathList { workgroups, count, paths }),
         #[cfg(feature = "bvh")]
         twin!(wgsl::BVH_TRACER_RAYS, "Params", bvh_tracer::gpu::Params { ray_count, row }),
         #[cfg(feature = "bvh")]
@@ -370,6 +370,13 @@ fn twins() -> Vec<Twin> {
         }),
         twin!(wgsl::PHOTON_EMITTER, "EmissionTable", guiding_tables::gpu::EmissionTable { columns, rows }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "ReflectionTable", guiding_tables::gpu::ReflectionTable { columns, rows }),
+        twin!(wgsl::SELECTIVE_EMITTER_PROBE, "Params", selective_emitter::gpu::Params {
+            path_count, hop_count, light_count, group_count, interval, first_group, round, budget, kept_count,
+            position_tolerance, flux_tolerance, moved_low, moved_high,
+        }),
+        twin!(wgsl::SELECTIVE_EMITTER_PROBE, "GroupedLight", photon_groups::gpu::GroupedLight {
+            first_path, path_count, first_group, group_count,
+        }),
         twin!(wgsl::PHOTON_STREAM, "Params", photon_stream::gpu::Params {
             path_count, hop_count, first_path, pool_count, row, share,
         }),
@@ -480,12 +487,17 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "DepthHierarchyBuild measure" | "DepthHierarchyBuild join" => vec![&depth_hierarchy_build::SLOTS],
         "MeshGeometry" => vec![&mesh_geometry::SCENE_SLOTS, &mesh_geometry::MATERIAL_SLOTS],
         "PhotonEmitter" => vec![&photon_emitter::SLOTS, &photon_emitter::SPREAD_SLOTS],
+        "PhotonEmitter::listed" => vec![&photon_emitter::SLOTS, &photon_walk::LIST_SLOTS],
         "PhotonEmitter::at_targets" => vec![&photon_emitter::SLOTS, &photon_emitter::SPREAD_SLOTS],
-        "ImageSpaceTracer" => vec![&photon_walk::SLOTS, &image_space_tracer::SLOTS],
+        "ImageSpaceTracer" => vec![
+            &photon_walk::SLOTS,
+            &image_space_tracer::SLOTS,
+            &photon_walk::LIST_SLOTS,
+        ],
         "ImageSpaceTracer rays" => vec![&image_space_tracer::RAY_SLOTS, &image_space_tracer::SLOTS],
         "ImageSpaceTracer list" => vec![&image_space_tracer::LIST_SLOTS],
         #[cfg(feature = "bvh")]
-        "BvhTracer" => vec![&photon_walk::SLOTS, &bvh_geometry::BVH_SLOTS, &bvh_tracer::LOST_SLOTS],
+        "BvhTracer" => vec![&photon_walk::SLOTS, &bvh_geometry::BVH_SLOTS, &photon_walk::LIST_SLOTS],
         #[cfg(feature = "bvh")]
         "BvhTracer rays" | "BvhTracer surface rays" => vec![&bvh_tracer::RAY_SLOTS, &bvh_geometry::BVH_SLOTS],
         "PhotonGuiding count" => vec![&photon_guiding::COUNT_SLOTS],
@@ -507,6 +519,10 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "PhotonStream near" => vec![&photon_stream::NEAR_SLOTS],
         "PhotonStream places" => vec![&photon_stream::PLACE_SLOTS],
         "PhotonStream at impacts" => vec![&photon_stream::IMPACT_SLOTS],
+        "SelectiveEmitter probe" => vec![&selective_emitter::PROBE_SLOTS],
+        "SelectiveEmitter keep" => vec![&selective_emitter::KEEP_SLOTS],
+        "SelectiveEmitter compare" => vec![&selective_emitter::COMPARE_SLOTS],
+        "SelectiveEmitter choose" => vec![&selective_emitter::CHOICE_SLOTS],
         "SurfaceLightShading loop" | "SurfaceLightShading tiles" => vec![&surface_light_shading::SHADE_SLOTS],
         "SurfaceLightShading draw" => vec![&surface_light_shading::DRAW_SLOTS],
         "SurfaceLightShading spread" => vec![&surface_light_shading::rays::SPREAD_SLOTS],
@@ -788,7 +804,7 @@ fn photon_states_are_the_same_on_both_sides() {
 #[test]
 fn blocks_of_lost_rays_are_the_same_on_both_sides() {
     let shader = Shader::new("ImageSpaceTracer list", wgsl::IMAGE_SPACE_TRACER_LIST);
-    assert_eq!(shader.constant("BLOCK"), Literal::U32(lost_rays::BLOCK));
+    assert_eq!(shader.constant("BLOCK"), Literal::U32(path_list::BLOCK));
 }
 
 #[test]

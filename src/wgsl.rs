@@ -33,9 +33,30 @@ pub(crate) const MESH_GEOMETRY: &str = compose![
 
 pub(crate) const PHOTON_EMITTER: &str = compose![
     "pass/photon_emitter/emit_photons.wgsl",
+    "pass/photon_emitter/emit_photon.wgsl",
     "pass/photon_emitter/first_hit.wgsl",
     "common/emission_tables.wgsl",
     "common/emission_grid.wgsl",
+    "common/light.wgsl",
+    "common/polygon.wgsl",
+    "common/photon.wgsl",
+    "common/surface_texel.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+    "common/cube_face.wgsl",
+    "common/sampling.wgsl",
+    "common/random.wgsl",
+    "common/halton.wgsl",
+    "common/hash.wgsl",
+    "common/lobe.wgsl",
+    "common/hit.wgsl",
+];
+
+pub(crate) const PHOTON_EMITTER_LISTED: &str = compose![
+    "pass/photon_emitter/emit_listed.wgsl",
+    "pass/photon_emitter/emit_photon.wgsl",
+    "pass/photon_emitter/first_hit.wgsl",
+    "common/path_list.wgsl",
     "common/light.wgsl",
     "common/polygon.wgsl",
     "common/photon.wgsl",
@@ -136,6 +157,7 @@ pub(crate) const IMAGE_SPACE_TRACER: &str = compose![
     "pass/image_space_tracer/hierarchy.wgsl",
     "pass/image_space_tracer/nearest.wgsl",
     "pass/image_space_tracer/ordered.wgsl",
+    "pass/photon_walk/walk_listed.wgsl",
     "pass/photon_walk/walk_photons.wgsl",
     "pass/photon_walk/params.wgsl",
     "common/reflection_tables.wgsl",
@@ -143,6 +165,7 @@ pub(crate) const IMAGE_SPACE_TRACER: &str = compose![
     "common/depth_range.wgsl",
     "common/env_map.wgsl",
     "common/hit.wgsl",
+    "common/path_list.wgsl",
     "common/photon.wgsl",
     "common/surface_texel.wgsl",
     "common/octahedral.wgsl",
@@ -161,7 +184,7 @@ pub(crate) const IMAGE_SPACE_TRACER: &str = compose![
 pub(crate) const IMAGE_SPACE_TRACER_LIST: &str = compose![
     "pass/image_space_tracer/list_lost.wgsl",
     "pass/photon_walk/params.wgsl",
-    "common/lost_rays.wgsl",
+    "common/path_list.wgsl",
     "common/photon.wgsl",
     "common/octahedral.wgsl",
 ];
@@ -169,8 +192,8 @@ pub(crate) const IMAGE_SPACE_TRACER_LIST: &str = compose![
 #[cfg(feature = "bvh")]
 pub(crate) const BVH_TRACER: &str = compose![
     "pass/bvh_tracer/trace_ray.wgsl",
-    "pass/bvh_tracer/walk_lost.wgsl",
     "pass/bvh_tracer/bindings.wgsl",
+    "pass/photon_walk/walk_listed.wgsl",
     "pass/photon_walk/walk_photons.wgsl",
     "pass/photon_walk/params.wgsl",
     "common/reflection_tables.wgsl",
@@ -178,7 +201,7 @@ pub(crate) const BVH_TRACER: &str = compose![
     "common/bvh.wgsl",
     "common/bvh_surface.wgsl",
     "common/hit.wgsl",
-    "common/lost_rays.wgsl",
+    "common/path_list.wgsl",
     "common/photon.wgsl",
     "common/octahedral.wgsl",
     "common/reflectance.wgsl",
@@ -433,6 +456,37 @@ pub(crate) const PHOTON_STREAM_AT_IMPACTS: &str = compose![
     "common/hash.wgsl",
 ];
 
+pub(crate) const SELECTIVE_EMITTER_PROBE: &str = compose![
+    "pass/selective_emitter/list_probes.wgsl",
+    "pass/selective_emitter/groups.wgsl",
+    "pass/selective_emitter/params.wgsl",
+    "common/path_list.wgsl",
+];
+
+pub(crate) const SELECTIVE_EMITTER_KEEP: &str = compose![
+    "pass/selective_emitter/keep_paths.wgsl",
+    "pass/selective_emitter/params.wgsl",
+    "common/path_list.wgsl",
+    "common/photon.wgsl",
+    "common/octahedral.wgsl",
+];
+
+pub(crate) const SELECTIVE_EMITTER_COMPARE: &str = compose![
+    "pass/selective_emitter/compare_paths.wgsl",
+    "pass/selective_emitter/groups.wgsl",
+    "pass/selective_emitter/params.wgsl",
+    "common/path_list.wgsl",
+    "common/photon.wgsl",
+    "common/octahedral.wgsl",
+];
+
+pub(crate) const SELECTIVE_EMITTER_CHOOSE: &str = compose![
+    "pass/selective_emitter/choose_groups.wgsl",
+    "pass/selective_emitter/groups.wgsl",
+    "pass/selective_emitter/params.wgsl",
+    "common/path_list.wgsl",
+];
+
 pub(crate) const SURFACE_LIGHT_LOOP: &str = compose![
     "pass/surface_light_shading/loop_lights.wgsl",
     "pass/surface_light_shading/bindings.wgsl",
@@ -556,7 +610,7 @@ pub(crate) const UPSAMPLER: &str = compose![
     "pass/upsampler.wgsl",
     "common/interpolate.wgsl",
     "common/bilateral.wgsl",
-    "common/lost_rays.wgsl",
+    "common/path_list.wgsl",
     "common/g_buffer.wgsl",
     "common/subsampling.wgsl",
     "common/octahedral.wgsl",
@@ -966,6 +1020,7 @@ pub(crate) const BVH_FUNCTIONS: &str = compose![
 pub const MODULES: &[(&str, &str)] = &[
     ("MeshGeometry", MESH_GEOMETRY),
     ("PhotonEmitter", PHOTON_EMITTER),
+    ("PhotonEmitter::listed", PHOTON_EMITTER_LISTED),
     ("PhotonEmitter::at_targets", PHOTON_EMITTER_AT_TARGETS),
     ("PhotonGuiding count", PHOTON_GUIDING_COUNT),
     ("PhotonGuiding emission", PHOTON_GUIDING_EMISSION),
@@ -999,6 +1054,10 @@ pub const MODULES: &[(&str, &str)] = &[
     ("PhotonStream near", PHOTON_STREAM_NEAR),
     ("PhotonStream places", PHOTON_STREAM_PLACES),
     ("PhotonStream at impacts", PHOTON_STREAM_AT_IMPACTS),
+    ("SelectiveEmitter probe", SELECTIVE_EMITTER_PROBE),
+    ("SelectiveEmitter keep", SELECTIVE_EMITTER_KEEP),
+    ("SelectiveEmitter compare", SELECTIVE_EMITTER_COMPARE),
+    ("SelectiveEmitter choose", SELECTIVE_EMITTER_CHOOSE),
     ("SurfaceLightShading loop", SURFACE_LIGHT_LOOP),
     ("SurfaceLightShading tiles", SURFACE_LIGHT_TILES),
     ("SurfaceLightShading draw", SURFACE_LIGHT_DRAW),
@@ -1039,7 +1098,7 @@ pub const MODULES: &[(&str, &str)] = &[
 #[doc(hidden)]
 pub const COMMON: &str = compose![
     "common/depth_range.wgsl",
-    "common/lost_rays.wgsl",
+    "common/path_list.wgsl",
     "common/photon.wgsl",
     "common/polygon.wgsl",
     "common/hit.wgsl",

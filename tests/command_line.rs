@@ -208,7 +208,7 @@ fn images_and_statistics_are_written_whole() {
         .map(|v| v.as_u64().unwrap())
         .sum();
     assert_eq!(bytes["total"].as_u64().unwrap(), sum);
-    assert_eq!(stats["plan"].as_array().unwrap().len(), 25);
+    assert_eq!(stats["plan"].as_array().unwrap().len(), 26);
     // Of a scene in motion, with a lamp that casts penumbrae.
     render_to_penumbra(&path("p.json"));
     let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(path("p.json")).unwrap()).unwrap();

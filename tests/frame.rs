@@ -233,7 +233,7 @@ fn walk_by_hand(
     (env_maps, hierarchy): (&EnvMaps, Option<&DepthHierarchy>),
     (geometry, photons): (&BvhGeometry, &Photons),
 ) {
-    let lost = LostRays::new(device, photons).unwrap();
+    let lost = PathList::new(device, photons).unwrap();
     let bounces = photons.bounces();
     let (image_space, triangles) = (
         ImageSpaceTracer::new(device, settings.trace_method),

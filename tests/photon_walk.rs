@@ -71,6 +71,17 @@ impl<'a> World<'a> {
     }
 
     fn image_space(&self, env_maps: &EnvMaps, photons: &Photons, shared: Option<SharedHop<'_>>) {
+        self.image_space_part(env_maps, photons, shared, None);
+    }
+
+    /// The walk of all paths, or of some.
+    fn image_space_part(
+        &self,
+        env_maps: &EnvMaps,
+        photons: &Photons,
+        shared: Option<SharedHop<'_>>,
+        list: Option<&PathList>,
+    ) {
         let device = &self.gpu.device;
         let mut resources = ImageSpaceTracerResources::for_shared_hops(device, BOUNCES).unwrap();
         let hierarchy = DepthHierarchy::new(device, env_maps).unwrap();
@@ -95,13 +106,22 @@ impl<'a> World<'a> {
         submit(self.gpu, |encoder| {
             let mut build = DepthHierarchyBuildResources::new(device, env_maps).unwrap();
             DepthHierarchyBuild::new(device).record(encoder, &mut build, &build_inputs);
-            self.image_space_tracer
-                .record(encoder, &mut resources, &inputs)
-                .unwrap();
+            let recorded = match list {
+                None => self.image_space_tracer.record(encoder, &mut resources, &inputs),
+                Some(list) => self
+                    .image_space_tracer
+                    .record_listed(encoder, &mut resources, &inputs, list),
+            };
+            recorded.unwrap();
         });
     }
 
     fn triangles(&self, photons: &Photons, shared: Option<SharedHop<'_>>) {
+        self.triangles_part(photons, shared, None);
+    }
+
+    /// The walk of all paths, or of some.
+    fn triangles_part(&self, photons: &Photons, shared: Option<SharedHop<'_>>, list: Option<&PathList>) {
         let mut resources = BvhTracerResources::for_shared_hops(&self.gpu.device, BOUNCES).unwrap();
         let inputs = BvhTracerInputs {
             queue: &self.gpu.queue,
@@ -113,14 +133,15 @@ impl<'a> World<'a> {
             roulette_from: ImageSpaceTracerSettings::default().roulette_from,
             timestamps: None,
         };
-        submit(self.gpu, |encoder| {
-            self.bvh_tracer.record(encoder, &mut resources, &inputs);
+        submit(self.gpu, |encoder| match list {
+            None => self.bvh_tracer.record(encoder, &mut resources, &inputs),
+            Some(list) => self.bvh_tracer.record_listed(encoder, &mut resources, &inputs, list),
         });
     }
 
     /// The whole walk of two tracers that take turns.
     fn hybrid(&self, env_maps: &EnvMaps, photons: &Photons) {
-        let lost = LostRays::new(&self.gpu.device, photons).unwrap();
+        let lost = PathList::new(&self.gpu.device, photons).unwrap();
         for number in 1..=photons.bounces() {
             let shared = Some(SharedHop { number, lost: &lost });
             self.image_space(env_maps, photons, shared);
@@ -165,7 +186,7 @@ fn read(gpu: &Gpu, photons: &Photons) -> Vec<Photon> {
 }
 
 /// Workgroups of the indirect dispatch, and the paths.
-fn read_list(gpu: &Gpu, lost: &LostRays) -> ([u32; 3], Vec<u32>) {
+fn read_list(gpu: &Gpu, lost: &PathList) -> ([u32; 3], Vec<u32>) {
     let words: Vec<u32> = read_buffer_blocking(&gpu.device, &gpu.queue, lost.buffer()).unwrap();
     let end = 4 + words[3] as usize;
     ([words[0], words[1], words[2]], words[4..end].to_vec())
@@ -195,7 +216,7 @@ fn hops_walked_one_at_a_time_are_those_of_the_whole_walk_and_lists_hold_what_was
         let whole = upload(&gpu, first.len(), &first);
         world.image_space(world.env_maps(), &whole, None);
         let hops = upload(&gpu, first.len(), &first);
-        let lost = LostRays::new(&gpu.device, &hops).unwrap();
+        let lost = PathList::new(&gpu.device, &hops).unwrap();
         let whole = read(&gpu, &whole);
         let mut counts = Vec::new();
         for number in 1..=BOUNCES {
@@ -227,7 +248,7 @@ fn what_image_space_loses_continues_with_what_the_triangles_say() {
         for hop in 1..=BOUNCES {
             // This hop of all paths, from where image space had come to, along the same directions, against triangles.
             let again = upload(&gpu, paths, &alone[..hop as usize * paths]);
-            let lost = LostRays::new(&gpu.device, &again).unwrap();
+            let lost = PathList::new(&gpu.device, &again).unwrap();
             let shared = Some(SharedHop {
                 number: hop,
                 lost: &lost,
@@ -261,13 +282,45 @@ fn what_image_space_loses_continues_with_what_the_triangles_say() {
 }
 
 #[test]
+fn some_paths_walked_alone_are_those_of_the_whole_walk_and_others_stay() {
+    let Some(gpu) = gpu() else { return };
+    let world = World::new(&gpu, &samples::pillars(0.3));
+    let first = world.first_hits();
+    let mut some: Vec<u32> = (0..first.len() as u32).filter(|i| i % 7 == 3 || i % 11 == 0).collect();
+    // In no particular order.
+    some.reverse();
+    let whole = [(); 2].map(|()| upload(&gpu, first.len(), &first));
+    let part = [(); 2].map(|()| upload(&gpu, first.len(), &first));
+    let list = PathList::new(&gpu.device, &whole[0]).unwrap();
+    let groups = some.len().div_ceil(64) as u32;
+    let words = [&[groups, 1, 1, some.len() as u32], &some[..]].concat();
+    gpu.queue.write_buffer(list.buffer(), 0, bytemuck::cast_slice(&words));
+    world.triangles(&whole[0], None);
+    world.triangles_part(&part[0], None, Some(&list));
+    world.image_space(world.env_maps(), &whole[1], None);
+    world.image_space_part(world.env_maps(), &part[1], None, Some(&list));
+    for (whole, part) in whole.iter().zip(&part) {
+        let (whole, part) = (read(&gpu, whole), read(&gpu, part));
+        assert!(whole.iter().filter(|p| p.state() == PhotonState::Stored).count() > 2 * first.len());
+        for (slot, (whole, part)) in whole.iter().zip(&part).enumerate().skip(first.len()) {
+            let path = (slot % first.len()) as u32;
+            match path % 7 == 3 || path % 11 == 0 {
+                true => assert!(agree(whole, part), "slot {slot}"),
+                false => assert!(*part == bytemuck::Zeroable::zeroed(), "slot {slot}"),
+            }
+        }
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
 fn where_image_space_sees_nothing_the_triangles_do_all_and_the_list_holds_every_path() {
     let Some(gpu) = gpu() else { return };
     let world = World::new(&gpu, &samples::two_rooms(0.3));
     let first = world.first_hits();
     assert!(first.iter().all(|p| p.state() == PhotonState::Stored), "a closed room");
     let (alone, both) = (upload(&gpu, first.len(), &first), upload(&gpu, first.len(), &first));
-    let lost = LostRays::new(&gpu.device, &both).unwrap();
+    let lost = PathList::new(&gpu.device, &both).unwrap();
     world.image_space(&world.no_maps(), &both, Some(SharedHop { number: 1, lost: &lost }));
     let (workgroups, paths) = read_list(&gpu, &lost);
     assert!(paths.into_iter().eq(0..first.len() as u32));
@@ -320,7 +373,7 @@ fn lists_of_any_length_are_in_order() {
                 .map(|(i, _)| i)
                 .collect();
             let photons = upload(&gpu, count, &first);
-            let lost = LostRays::new(&gpu.device, &photons).unwrap();
+            let lost = PathList::new(&gpu.device, &photons).unwrap();
             let shared = Some(SharedHop { number: 1, lost: &lost });
             world.image_space(&world.no_maps(), &photons, shared);
             let (workgroups, paths) = read_list(&gpu, &lost);
@@ -345,7 +398,7 @@ fn a_list_with_less_room_holds_the_paths_that_it_has_room_for() {
     let world = World::new(&gpu, &samples::plane());
     let photons = upload(&gpu, 1000, &floor_hits(1000, |i| i % 3 == 0));
     let fewer = Photons::new(&gpu.device, 200, 1).unwrap();
-    let lost = LostRays::new(&gpu.device, &fewer).unwrap();
+    let lost = PathList::new(&gpu.device, &fewer).unwrap();
     let shared = SharedHop { number: 1, lost: &lost };
     world.image_space(&world.no_maps(), &photons, Some(shared));
     let expected: Vec<u32> = (0..200).filter(|i| i % 3 == 0).collect();
@@ -365,7 +418,7 @@ fn lists_spread_over_two_dimensions_of_workgroups_are_traced_to_the_end() {
     let Some(gpu) = gpu() else { return };
     let world = World::new(&gpu, &samples::plane());
     let photons = upload(&gpu, 2000, &floor_hits(2000, |_| true));
-    let lost = LostRays::new(&gpu.device, &photons).unwrap();
+    let lost = PathList::new(&gpu.device, &photons).unwrap();
     // 7 × 3 workgroups of 64, the last one of them with two paths.
     let paths: Vec<u32> = (0..20 * 64 + 2).map(|i| (i * 7) % 2000).collect();
     let list = [&[7, 3, 1, paths.len() as u32], &paths[..]].concat();

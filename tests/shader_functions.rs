@@ -1022,7 +1022,7 @@ fn workgroups_for_lost_rays_hold_all_of_them_within_the_limit() {
         .map(|count| [count; 4])
         .collect();
     let body = "
-        let groups = lost_rays_workgroups(input.x);
+        let groups = path_list_workgroups(input.x);
         return vec4f(f32(groups[0]), f32(groups[1]), f32(groups[2]), 0.0);";
     for ([count, ..], groups) in counts.iter().zip(run(&gpu, body, &counts)) {
         let [x, y, z, _] = groups.map(|v| v as u32);

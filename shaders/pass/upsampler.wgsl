@@ -49,5 +49,5 @@ fn upsample_pixels(@builtin(global_invocation_id) id: vec3u, @builtin(local_invo
 // What an indirect dispatch needs.
 @compute @workgroup_size(1)
 fn count_marks() {
-    marked.workgroups = lost_rays_workgroups(atomicLoad(&marked.count));
+    marked.workgroups = path_list_workgroups(atomicLoad(&marked.count));
 }

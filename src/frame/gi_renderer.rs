@@ -28,8 +28,8 @@ use crate::pass::{
 use crate::resource::BvhGeometry;
 use crate::resource::{
     CameraView, CapturePurpose, CaptureView, DepthHierarchy, EnvMapIrradiance, EnvMaps, Environment, GBuffer, Geometry,
-    GuidingTables, Irradiance, MarkedPixels, PhotonPool, Photons, PrepareContext, Radiance, ShadowMaps, Subsampling,
-    SurfaceLights, Visibility,
+    GuidingTables, Irradiance, MarkedPixels, PhotonGroups, PhotonPool, Photons, PrepareContext, Radiance, ShadowMaps,
+    Subsampling, SurfaceLights, Visibility,
 };
 use crate::scene::{
     Camera, EnvironmentImage, Lamp, Light, LightKind, LightSources, Projection, SceneBounds, SceneSummary,
@@ -454,6 +454,9 @@ impl GiRenderer {
         self.record_shadow_maps(&mut encoder, &inputs);
         self.record_photons(&mut encoder, &inputs)?;
         queue.submit([encoder.finish()]);
+        if let Some(indirect) = &mut self.indirect {
+            indirect.retrace();
+        }
         Ok(())
     }
 
@@ -660,7 +663,7 @@ impl GiRenderer {
     }
 
     fn record_photons(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) -> Result<(), Error> {
-        if let (Some(direct), Some(indirect)) = (&self.direct, &mut self.indirect) {
+        if let (Some(direct), Some(indirect), Some(state)) = (&self.direct, &mut self.indirect, &self.state) {
             let photon_inputs = PhotonInputs {
                 scene: inputs,
                 settings: &self.settings,
@@ -672,12 +675,13 @@ impl GiRenderer {
                 revision: self.revision,
                 #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
                 feeder: self.photon_feeder.as_ref(),
-                area: self.state.as_ref().map_or(1.0, |s| s.area),
-                radius: self.state.as_ref().map_or(1.0, |s| s.frame.radius()),
+                frame: &state.frame,
+                area: state.area,
+                radius: state.frame.radius(),
             };
             indirect.record(encoder, &self.passes.photons, &photon_inputs)?;
             self.recapture.recorded();
-            self.photons_frame = self.state.as_ref().map(|s| s.frame);
+            self.photons_frame = Some(state.frame);
         }
         Ok(())
     }
@@ -997,6 +1001,11 @@ impl GiRenderer {
     /// The photons that they are made of, unless they stand at impacts.
     pub fn photon_pool(&self) -> Option<&PhotonPool> {
         self.indirect.as_ref()?.surface_lights()?.pool()
+    }
+
+    /// Photons in groups, while [`Settings::selective`] has them stay until their way changes.
+    pub fn photon_groups(&self) -> Option<&PhotonGroups> {
+        self.indirect.as_ref()?.photon_groups()
     }
 
     /// Where photons go, while [`Settings::guided_photons`] is above 0 and there is indirect light.

@@ -13,11 +13,11 @@ use crate::pass::{
     EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources,
     EnvMapLightingSettings, FirstHits, Guiding, GuidingUpdateInputs, GuidingUpdateResources, ImageSpaceTracer,
     PhotonEmitter, PhotonGrid, PhotonGridInputs, PhotonGridResources, PhotonGuiding, PhotonSpread, PhotonStream,
-    SortedPhotons,
+    SelectiveEmitter, SortedPhotons,
 };
 use crate::resource::{
-    CaptureView, DepthHierarchy, EnvMapIrradiance, EnvMaps, GuidingTables, Lights, PhotonMap, PhotonTargets, Photons,
-    ShadowMaps,
+    CaptureView, DepthHierarchy, EnvMapIrradiance, EnvMaps, GuidingTables, Lights, PhotonGroups, PhotonMap,
+    PhotonTargets, Photons, ShadowMaps,
 };
 use crate::scene::{BoundingSphere, UnitFrame};
 
@@ -30,6 +30,8 @@ pub(super) struct PhotonPasses {
     /// If the settings use it.
     pub(super) photon_guiding: Option<PhotonGuiding>,
     pub(super) photon_emitter: PhotonEmitter,
+    /// If photons stay until their way changes.
+    pub(super) selective_emitter: Option<SelectiveEmitter>,
     /// Those that the settings use.
     pub(super) image_space_tracer: Option<ImageSpaceTracer>,
     #[cfg(feature = "bvh")]
@@ -89,6 +91,8 @@ pub(super) struct PhotonInputs<'a> {
     /// What brings photons instead of tracers, for surface lights.
     #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
     pub(super) feeder: Option<&'a PhotonFeeder>,
+    /// That photons are of.
+    pub(super) frame: &'a UnitFrame,
     /// Of all surfaces, unit frame.
     pub(super) area: f32,
     /// Of the region, unit frame.
@@ -104,6 +108,7 @@ impl PhotonPasses {
             depth_hierarchy_build: settings.needs_hierarchy().then(|| DepthHierarchyBuild::new(device)),
             photon_guiding: (settings.guided_photons > 0.0).then(|| PhotonGuiding::new(device)),
             photon_emitter: PhotonEmitter::new(device),
+            selective_emitter: settings.selects_photons().then(|| SelectiveEmitter::new(device)),
             image_space_tracer: kind.uses_env_maps().then(|| ImageSpaceTracer::new(device, method)),
             #[cfg(feature = "bvh")]
             bvh_tracer: kind.uses_triangles().then(|| BvhTracer::new(device)),
@@ -121,11 +126,19 @@ impl PhotonPasses {
 
 impl IndirectScene {
     pub(super) fn new(device: &wgpu::Device, queue: &wgpu::Queue, settings: &Settings) -> Result<Self, Error> {
-        let global = TracedPhotons::new(
+        let kind = match settings.tracer_kind {
+            // What is traced again would differ by tracers.
+            TracerKind::Hybrid if settings.selects_photons() => TracerKind::Bvh,
+            kind => kind,
+        };
+        let mut global = TracedPhotons::new(
             device,
             (settings.traced_photons(), settings.walked_bounces()),
-            (PhotonMap::All, settings.tracer_kind),
+            (PhotonMap::All, kind),
         )?;
+        if settings.selects_photons() {
+            global.select(device, settings)?;
+        }
         let image_space = || {
             let env_maps = EnvMaps::new(
                 device,
@@ -232,6 +245,16 @@ impl IndirectScene {
     /// All but caustics, where these have photons of their own.
     pub(super) fn photons(&self) -> &Photons {
         &self.global.photons
+    }
+
+    /// Has all photons traced as a whole in the next frame, even if they stay until their way changes.
+    pub(super) fn retrace(&mut self) {
+        self.global.retrace();
+    }
+
+    /// In groups, if photons stay until their way changes.
+    pub(super) fn photon_groups(&self) -> Option<&PhotonGroups> {
+        self.global.groups()
     }
 
     /// Traces so many photons from now on, of those that there is room for.

@@ -14,6 +14,7 @@ mod photon_feeder;
 mod plan;
 mod recapture;
 mod selection_schedule;
+mod selective_photons;
 mod settings;
 mod specular_view;
 mod stand_ins;
@@ -26,6 +27,6 @@ pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};
 pub use photon_feeder::PhotonFeeder;
 pub use plan::{Plan, PlannedStage, Stage};
 pub use settings::{
-    CausticSettings, FinalGatherSettings, GlossyMethod, IndirectMethod, LightPlacement, Settings, SurfaceLightSettings,
-    TracerKind, Upsampling,
+    CausticSettings, FinalGatherSettings, GlossyMethod, IndirectMethod, LightPlacement, SelectiveSettings, Settings,
+    SurfaceLightSettings, TracerKind, Upsampling,
 };

@@ -29,6 +29,8 @@ pub enum Stage {
     PhotonGuiding,
     /// Photons from lights.
     PhotonEmitter,
+    /// Which photons are traced anew.
+    SelectiveEmitter,
     /// Photons from surface to surface, as environment maps see them.
     ImageSpaceTracer,
     /// Photons from triangle to triangle.
@@ -151,6 +153,7 @@ impl Plan {
                 stage(Stage::DepthHierarchyBuild, hierarchies),
                 stage(Stage::PhotonGuiding, guiding(&indirect, settings)),
                 stage(Stage::PhotonEmitter, indirect.clone()),
+                stage(Stage::SelectiveEmitter, selection_of_photons(&indirect, settings)),
                 stage(Stage::ImageSpaceTracer, image_space),
                 stage(Stage::BvhTracer, bvh),
                 stage(Stage::CausticMap, caustics),
@@ -334,6 +337,20 @@ fn estimates(indirect: &(bool, String), settings: &Settings) -> Estimates {
         }
     }
     all
+}
+
+/// Whether photons stay until their way changes.
+fn selection_of_photons(indirect: &(bool, String), settings: &Settings) -> (bool, String) {
+    let own = &settings.selective;
+    match (indirect.0, settings.selects_photons()) {
+        (false, _) => indirect.clone(),
+        (true, true) => (
+            true,
+            format!("groups of {}, {} photons anew a frame", own.group, own.emitter.budget),
+        ),
+        (true, false) if !own.is_on => (false, "settings trace all photons anew".to_owned()),
+        (true, false) => (false, "photons are guided, or of surface lights".to_owned()),
+    }
 }
 
 /// The tracer in image space, and that of triangles.

@@ -5,7 +5,8 @@ use crate::pass::{
     Bandwidth, BoundaryCorrection, CoverageMeasure, EnvMapSelectorResources, EnvMapSelectorSettings, FirstHits,
     ImageSpaceTracerSettings, IndirectShadows, Kernel, LARGEST_RADIUS, LightForm, LightShape, MAX_POINTS, MAX_SELECTED,
     MAX_TAPS, MOST_FILTER_RADIUS, OccluderTest, PenumbraSearch, PhotonSplatterConfig, PhotonSplatterSettings,
-    ShadowMethod, SoftShadowSettings, SplatShape, SurfaceLightShadingSettings, TraceMethod, UpsamplerSettings,
+    SelectiveEmitterSettings, ShadowMethod, SoftShadowSettings, SplatShape, SurfaceLightShadingSettings, TraceMethod,
+    UpsamplerSettings,
 };
 use crate::resource::{Lights, MAX_LIGHTS, Subsampling};
 
@@ -104,8 +105,31 @@ impl Default for SurfaceLightSettings {
                 ..Default::default()
             },
             near_photons: true,
-            near_kernel: 150.0,
+            near_kernel: 300.0,
             filter_radius: 1,
+        }
+    }
+}
+
+/// Photons that stay where they are until something changes on their way: of each group of similar directions one is traced a frame, and the
+/// others where it went elsewhere. Not for surface lights, which have a pool instead; not where photons are guided; and not in frames that
+/// are accumulated, each of which has photons of its own. What [`TracerKind::Hybrid`] traces, triangles alone then do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SelectiveSettings {
+    /// Whether they do.
+    pub is_on: bool,
+    /// Photons of a group, 1 or more: about so many. Fewer find small changes sooner, and cost more while nothing changes.
+    pub group: u32,
+    /// How many are traced anew, and when.
+    pub emitter: SelectiveEmitterSettings,
+}
+
+impl Default for SelectiveSettings {
+    fn default() -> Self {
+        Self {
+            is_on: false,
+            group: 40,
+            emitter: SelectiveEmitterSettings::default(),
         }
     }
 }
@@ -192,6 +216,8 @@ pub struct Settings {
     /// eye, as through a doorway or of a sun over a building; costs two looks at each photon, noise while things move, and,
     /// where frames are not accumulated, one to two hundredths of the light. 0.5 is a good start (`docs/density.md`).
     pub guided_photons: f32,
+    /// Photons traced anew only where their way has changed.
+    pub selective: SelectiveSettings,
     /// How photons find where they first land. Shadow maps are faster, and curved mirrors in them a little flattened. Those of
     /// caustics are traced wherever there are triangles, which then trace all of their hops.
     pub first_hits: FirstHits,
@@ -280,6 +306,7 @@ impl Settings {
             specular_surfaces: 4,
             specular_paths: 1,
             guided_photons: 0.0,
+            selective: SelectiveSettings::default(),
             env_map_count: 12,
             env_map_size: 64,
             environment_suns: 8,
@@ -316,6 +343,7 @@ impl Settings {
             frames: 1,
             photons: 500_000,
             guided_photons: 0.0,
+            selective: SelectiveSettings::default(),
             first_hits: FirstHits::default(),
             bounces: 3,
             env_map_count: 12,
@@ -363,6 +391,7 @@ impl Settings {
             specular_surfaces: 12,
             specular_paths: 1,
             guided_photons: 0.0,
+            selective: SelectiveSettings::default(),
             env_map_count: 16,
             env_map_size: 256,
             environment_suns: 48,
@@ -451,6 +480,14 @@ impl Settings {
             IndirectMethod::SurfaceLights if !self.keeps_near() => self.bounces.saturating_sub(1),
             _ => self.bounces,
         }
+    }
+
+    /// Whether photons stay that nothing has changed for.
+    pub(super) fn selects_photons(&self) -> bool {
+        self.selective.is_on
+            && self.guided_photons == 0.0
+            && self.indirect_method != IndirectMethod::SurfaceLights
+            && self.photons > 0
     }
 
     /// Whether photons that came a short way stand in for what surface lights lose there.
@@ -626,6 +663,32 @@ const KNOBS: &[Knob] = &[
     field!("photons.guided", "0 or more, and below 1", guided_photons, |v| (0.0
         ..1.0)
         .contains(&v)),
+    choice!("selective", "on or off", selective.is_on, ["on", true], ["off", false]),
+    field!("selective.group", "1 or more: photons", selective.group, |v| v >= 1),
+    field!(
+        "selective.budget",
+        "1 or more: photons a frame",
+        selective.emitter.budget,
+        |v| v >= 1
+    ),
+    field!(
+        "selective.interval",
+        "1 or more: frames",
+        selective.emitter.interval,
+        |v| v >= 1
+    ),
+    field!(
+        "selective.position_tolerance",
+        "0 or more: unit-frame length",
+        selective.emitter.position_tolerance,
+        |v: f32| v >= 0.0 && v.is_finite()
+    ),
+    field!(
+        "selective.flux_tolerance",
+        "0 to 1: share of the flux",
+        selective.emitter.flux_tolerance,
+        |v: f32| (0.0..=1.0).contains(&v)
+    ),
     choice!(
         "emission.first_hits",
         "shadow-maps or traced",

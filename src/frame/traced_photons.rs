@@ -1,7 +1,8 @@
 //! A photon map on its way from the lights to the last surface, by whichever tracers the settings choose.
 
-use super::TracerKind;
 use super::indirect_scene::{PhotonInputs, PhotonPasses};
+use super::selective_photons::SelectivePhotons;
+use super::{Settings, TracerKind};
 use crate::Error;
 #[cfg(feature = "bvh")]
 use crate::pass::{BvhTracerInputs, BvhTracerResources};
@@ -9,7 +10,7 @@ use crate::pass::{
     FirstHits, ImageSpaceTracerInputs, ImageSpaceTracerResources, PhotonEmitterInputs, PhotonEmitterResources,
     PhotonSpread, SharedHop,
 };
-use crate::resource::{DepthHierarchy, EnvMaps, LostRays, PhotonMap, Photons};
+use crate::resource::{DepthHierarchy, EnvMaps, PathList, PhotonGroups, PhotonMap, Photons};
 
 /// Fetches after which a ray is left to triangles unless settings name another number: groups of rays take 14 to 18 % fewer
 /// in furnished scenes, for up to 0.5 % more rays against triangles.
@@ -25,7 +26,19 @@ pub(super) struct TracedPhotons {
     #[cfg(feature = "bvh")]
     bvh: BvhTracerResources,
     /// While one tracer traces what the other loses.
-    lost: Option<LostRays>,
+    lost: Option<PathList>,
+    /// While photons stay until their way changes.
+    selective: Option<Box<SelectivePhotons>>,
+}
+
+/// Which part of the walk is recorded.
+#[derive(Clone, Copy)]
+enum Part<'a> {
+    All,
+    /// Of all paths, while two tracers share it.
+    Hop(u32),
+    /// All hops of these.
+    Listed(&'a PathList),
 }
 
 /// What a walk needs beside what all share.
@@ -56,10 +69,29 @@ impl TracedPhotons {
             image_space: ImageSpaceTracerResources::for_shared_hops(device, shared_hops)?,
             #[cfg(feature = "bvh")]
             bvh: BvhTracerResources::for_shared_hops(device, shared_hops)?,
-            lost: is_shared.then(|| LostRays::new(device, &photons)).transpose()?,
+            lost: is_shared.then(|| PathList::new(device, &photons)).transpose()?,
             kind,
+            selective: None,
             photons,
         })
+    }
+
+    /// Has photons stay until their way changes.
+    pub(super) fn select(&mut self, device: &wgpu::Device, settings: &Settings) -> Result<(), Error> {
+        self.selective = Some(Box::new(SelectivePhotons::new(device, settings, &self.photons)?));
+        Ok(())
+    }
+
+    /// Has all of them traced in the next frame.
+    pub(super) fn retrace(&mut self) {
+        if let Some(selective) = &mut self.selective {
+            selective.restart();
+        }
+    }
+
+    /// In groups, if they stay.
+    pub(super) fn groups(&self) -> Option<&PhotonGroups> {
+        self.selective.as_ref().map(|s| s.groups())
     }
 
     /// Traces so many from now on, of those that there is room for.
@@ -76,45 +108,69 @@ impl TracedPhotons {
         Ok(())
     }
 
-    /// Records the emission and the walk.
+    /// Records the emission and the walk: of all photons, or of those whose way has changed.
     pub(super) fn record(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
         passes: &PhotonPasses,
         inputs: &WalkInputs<'_>,
     ) -> Result<(), Error> {
-        let emitter_inputs = PhotonEmitterInputs {
-            queue: inputs.photons.scene.queue,
-            lights: inputs.photons.lights,
-            shadow_maps: inputs.photons.shadow_maps,
-            photons: &self.photons,
-            spread: inputs.spread,
-            first_hits: inputs.first_hits,
-            sample_offset: inputs.sample_offset,
-            timestamps: inputs.photons.scene.timestamps,
+        let (Some(pass), Some(mut selective)) = (&passes.selective_emitter, self.selective.take()) else {
+            return self.record_all(encoder, passes, inputs);
         };
+        let recorded = selective.record(encoder, (pass, passes), self, inputs);
+        self.selective = Some(selective);
+        recorded
+    }
+
+    /// Records the emission and the walk of some photons.
+    pub(super) fn record_listed(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        passes: &PhotonPasses,
+        inputs: &WalkInputs<'_>,
+        list: &PathList,
+    ) -> Result<(), Error> {
+        let emitter_inputs = emitter_inputs(&self.photons, inputs);
+        passes
+            .photon_emitter
+            .record_listed(encoder, &mut self.emitter, &emitter_inputs, list);
+        self.record_walk(encoder, passes, inputs, Part::Listed(list))
+    }
+
+    /// Records the emission and the walk of all photons.
+    pub(super) fn record_all(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        passes: &PhotonPasses,
+        inputs: &WalkInputs<'_>,
+    ) -> Result<(), Error> {
+        let emitter_inputs = emitter_inputs(&self.photons, inputs);
         passes
             .photon_emitter
             .record(encoder, &mut self.emitter, &emitter_inputs);
         if self.lost.is_none() {
-            return self.record_walk(encoder, passes, inputs, None);
+            return self.record_walk(encoder, passes, inputs, Part::All);
         }
         let starts_at_lights = inputs.first_hits == FirstHits::Traced || inputs.photons.lights.have_area();
         let mut hops = u32::from(!starts_at_lights)..=self.photons.bounces();
-        hops.try_for_each(|hop| self.record_walk(encoder, passes, inputs, Some(hop)))
+        hops.try_for_each(|hop| self.record_walk(encoder, passes, inputs, Part::Hop(hop)))
     }
 
-    /// Of each tracer that there is, the whole walk or one hop.
+    /// Of each tracer that there is, a part of the walk.
     fn record_walk(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
         passes: &PhotonPasses,
         inputs: &WalkInputs<'_>,
-        hop: Option<u32>,
+        part: Part<'_>,
     ) -> Result<(), Error> {
         let (scene, settings) = (inputs.photons.scene, inputs.photons.settings);
         let lost = self.lost.as_ref();
-        let shared = hop.zip(lost).map(|(number, lost)| SharedHop { number, lost });
+        let shared = match (part, lost) {
+            (Part::Hop(number), Some(lost)) => Some(SharedHop { number, lost }),
+            _ => None,
+        };
         if let (Some(tracer), Some((env_maps, hierarchy))) = (&passes.image_space_tracer, inputs.maps)
             && self.kind.uses_env_maps()
         {
@@ -133,7 +189,10 @@ impl TracedPhotons {
                 settings: &tracer_settings,
                 timestamps: scene.timestamps,
             };
-            tracer.record(encoder, &mut self.image_space, &tracer_inputs)?;
+            match part {
+                Part::Listed(list) => tracer.record_listed(encoder, &mut self.image_space, &tracer_inputs, list)?,
+                Part::All | Part::Hop(_) => tracer.record(encoder, &mut self.image_space, &tracer_inputs)?,
+            }
         }
         #[cfg(feature = "bvh")]
         if let (Some(tracer), Some(geometry)) = (&passes.bvh_tracer, scene.bvh)
@@ -149,7 +208,10 @@ impl TracedPhotons {
                 roulette_from: settings.tracer.roulette_from,
                 timestamps: scene.timestamps,
             };
-            tracer.record(encoder, &mut self.bvh, &tracer_inputs);
+            match part {
+                Part::Listed(list) => tracer.record_listed(encoder, &mut self.bvh, &tracer_inputs, list),
+                Part::All | Part::Hop(_) => tracer.record(encoder, &mut self.bvh, &tracer_inputs),
+            }
         }
         Ok(())
     }
@@ -159,7 +221,21 @@ impl TracedPhotons {
         let uniforms = self.emitter.memory_use() + self.image_space.memory_use();
         #[cfg(feature = "bvh")]
         let uniforms = uniforms + self.bvh.memory_use();
-        let lost = self.lost.as_ref().map_or(0, LostRays::memory_use);
-        [self.photons.memory_use(), lost, uniforms]
+        let lost = self.lost.as_ref().map_or(0, PathList::memory_use);
+        let photons = self.photons.memory_use() + self.selective.as_ref().map_or(0, |s| s.memory_use());
+        [photons, lost, uniforms]
+    }
+}
+
+fn emitter_inputs<'a>(photons: &'a Photons, inputs: &WalkInputs<'a>) -> PhotonEmitterInputs<'a> {
+    PhotonEmitterInputs {
+        queue: inputs.photons.scene.queue,
+        lights: inputs.photons.lights,
+        shadow_maps: inputs.photons.shadow_maps,
+        photons,
+        spread: inputs.spread,
+        first_hits: inputs.first_hits,
+        sample_offset: inputs.sample_offset,
+        timestamps: inputs.photons.scene.timestamps,
     }
 }

@@ -11,7 +11,7 @@ use super::photon_guiding::Guiding;
 use super::photon_walk::{PhotonWalk, PhotonWalkInputs, PhotonWalkResources, SharedHop};
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::bvh_geometry::BVH_SLOTS;
-use crate::resource::{BvhGeometry, Photons, Rays, SurfaceRays};
+use crate::resource::{BvhGeometry, PathList, Photons, Rays, SurfaceRays};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -28,9 +28,6 @@ pub(crate) mod gpu {
 
 /// Bindings of group 0 of `shaders/pass/bvh_tracer/trace_rays.wgsl` and `trace_surface_rays.wgsl`, in order.
 pub(crate) const RAY_SLOTS: [Slot; 3] = [Slot::Uniform, Slot::Storage, Slot::StorageMut];
-
-/// Bindings of group 2 of `shaders/pass/bvh_tracer/walk_lost.wgsl`.
-pub(crate) const LOST_SLOTS: [Slot; 1] = [Slot::Storage];
 
 /// What is asked of a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -49,9 +46,8 @@ pub struct BvhTracer {
     photon_walk: PhotonWalk,
     ray_layout: wgpu::BindGroupLayout,
     geometry_layout: wgpu::BindGroupLayout,
-    lost_layout: wgpu::BindGroupLayout,
     walk: wgpu::ComputePipeline,
-    walk_lost: wgpu::ComputePipeline,
+    walk_listed: wgpu::ComputePipeline,
     /// By [`RayQuery`].
     traces: [wgpu::ComputePipeline; 2],
     trace_surface_rays: wgpu::ComputePipeline,
@@ -64,7 +60,6 @@ pub struct BvhTracerResources {
     rays: ListResources,
     surface_rays: ListResources,
     geometry_groups: BindGroupCache,
-    lost_groups: BindGroupCache,
 }
 
 /// Of one kind of list.
@@ -142,7 +137,6 @@ impl BvhTracer {
         let photon_walk = PhotonWalk::new(device, "lightfall::BvhTracer::walk");
         let ray_layout = device::layout(device, "lightfall::BvhTracer::rays", stages, &RAY_SLOTS);
         let geometry_layout = device::layout(device, "lightfall::BvhTracer::geometry", stages, &BVH_SLOTS);
-        let lost_layout = device::layout(device, "lightfall::BvhTracer::lost", stages, &LOST_SLOTS);
         let pipeline = |label, source, entry_point, layouts: &[&wgpu::BindGroupLayout]| {
             device::compute_pipeline(
                 device,
@@ -172,11 +166,11 @@ impl BvhTracer {
                 "walk_photons",
                 &[&photon_walk.layout, &geometry_layout],
             ),
-            walk_lost: pipeline(
-                "lightfall::BvhTracer::walk_lost",
+            walk_listed: pipeline(
+                "lightfall::BvhTracer::walk_listed",
                 wgsl::BVH_TRACER,
-                "walk_lost",
-                &[&photon_walk.layout, &geometry_layout, &lost_layout],
+                "walk_listed",
+                &[&photon_walk.layout, &geometry_layout, &photon_walk.list_layout],
             ),
             traces: ["trace_closest", "trace_any"].map(trace),
             trace_surface_rays: pipeline(
@@ -188,7 +182,6 @@ impl BvhTracer {
             photon_walk,
             ray_layout,
             geometry_layout,
-            lost_layout,
         }
     }
 
@@ -198,6 +191,35 @@ impl BvhTracer {
         encoder: &mut wgpu::CommandEncoder,
         resources: &mut BvhTracerResources,
         inputs: &BvhTracerInputs<'_>,
+    ) {
+        self.record_walk(encoder, resources, inputs, inputs.shared.map(|hop| hop.lost));
+    }
+
+    /// Records the walk of some paths alone, over what is there.
+    pub fn record_listed(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut BvhTracerResources,
+        inputs: &BvhTracerInputs<'_>,
+        list: &PathList,
+    ) {
+        self.record_walk(
+            encoder,
+            resources,
+            &BvhTracerInputs {
+                shared: None,
+                ..*inputs
+            },
+            Some(list),
+        );
+    }
+
+    fn record_walk(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut BvhTracerResources,
+        inputs: &BvhTracerInputs<'_>,
+        list: Option<&PathList>,
     ) {
         let walk = PhotonWalkInputs {
             queue: inputs.queue,
@@ -215,17 +237,15 @@ impl BvhTracer {
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_bind_group(0, &walk.group, &[]);
         pass.set_bind_group(1, &geometry, &[]);
-        match inputs.shared {
+        match list {
             None => {
                 pass.set_pipeline(&self.walk);
                 pass.dispatch_workgroups(walk.groups[0], walk.groups[1], 1);
             }
-            Some(hop) => {
-                let (groups, layout) = (&mut resources.lost_groups, &self.lost_layout);
-                let lost = groups.get(&self.device, label, layout, &[hop.lost.buffer().into()]);
-                pass.set_pipeline(&self.walk_lost);
-                pass.set_bind_group(2, &lost, &[]);
-                pass.dispatch_workgroups_indirect(hop.lost.buffer(), 0);
+            Some(list) => {
+                pass.set_pipeline(&self.walk_listed);
+                pass.set_bind_group(2, &self.photon_walk.list_group(&mut resources.walk, list), &[]);
+                pass.dispatch_workgroups_indirect(list.buffer(), 0);
             }
         }
     }
@@ -315,7 +335,6 @@ impl BvhTracerResources {
             rays: ListResources::new(device)?,
             surface_rays: ListResources::new(device)?,
             geometry_groups: BindGroupCache::default(),
-            lost_groups: BindGroupCache::default(),
         })
     }
 

@@ -11,7 +11,7 @@ use super::dispatch_64;
 use super::photon_guiding::Guiding;
 use super::photon_walk::{PhotonWalk, PhotonWalkInputs, PhotonWalkResources, PreparedWalk, SharedHop};
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
-use crate::resource::{DepthHierarchy, EnvMaps, LostRays, Photons, RANGE_FORMAT, SurfaceRays};
+use crate::resource::{DepthHierarchy, EnvMaps, PathList, Photons, RANGE_FORMAT, SurfaceRays};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -134,6 +134,7 @@ pub struct ImageSpaceTracer {
     method: TraceMethod,
     layout: wgpu::BindGroupLayout,
     walk_pipeline: wgpu::ComputePipeline,
+    walk_listed: wgpu::ComputePipeline,
     ray_layout: wgpu::BindGroupLayout,
     trace: wgpu::ComputePipeline,
     list_layout: wgpu::BindGroupLayout,
@@ -205,14 +206,14 @@ impl ImageSpaceTracer {
         let layout = device::layout(device, "lightfall::ImageSpaceTracer", stages, &SLOTS);
         let ray_layout = device::layout(device, "lightfall::ImageSpaceTracer::rays", stages, &RAY_SLOTS);
         let list_layout = device::layout(device, "lightfall::ImageSpaceTracer::list", stages, &LIST_SLOTS);
-        let by_method = |label, source, entry_point, own: &wgpu::BindGroupLayout| {
+        let by_method = |label, source, entry_point, layouts: &[&wgpu::BindGroupLayout]| {
             device::compute_pipeline(
                 device,
                 &ComputeSpec {
                     label,
                     source,
                     entry_point,
-                    layouts: &[own, &layout],
+                    layouts,
                     constants: &[("method", f64::from(method as u32))],
                 },
             )
@@ -236,13 +237,19 @@ impl ImageSpaceTracer {
                 "lightfall::ImageSpaceTracer::walk",
                 wgsl::IMAGE_SPACE_TRACER,
                 "walk_photons",
-                &walk.layout,
+                &[&walk.layout, &layout],
+            ),
+            walk_listed: by_method(
+                "lightfall::ImageSpaceTracer::walk_listed",
+                wgsl::IMAGE_SPACE_TRACER,
+                "walk_listed",
+                &[&walk.layout, &layout, &walk.list_layout],
             ),
             trace: by_method(
                 "lightfall::ImageSpaceTracer::trace_rays",
                 wgsl::IMAGE_SPACE_TRACER_RAYS,
                 "trace_rays",
-                &ray_layout,
+                &[&ray_layout, &layout],
             ),
             count_lost: step("lightfall::ImageSpaceTracer::count_lost", "count_lost"),
             sum_blocks: step("lightfall::ImageSpaceTracer::sum_blocks", "sum_blocks"),
@@ -269,6 +276,55 @@ impl ImageSpaceTracer {
         resources: &mut ImageSpaceTracerResources,
         inputs: &ImageSpaceTracerInputs<'_>,
     ) -> Result<(), Error> {
+        let Some((walk, maps)) = self.prepare(resources, inputs)? else {
+            return Ok(());
+        };
+        let mut pass = device::compute_pass(encoder, "lightfall::ImageSpaceTracer", inputs.timestamps);
+        pass.set_pipeline(&self.walk_pipeline);
+        pass.set_bind_group(0, &walk.group, &[]);
+        pass.set_bind_group(1, &maps, &[]);
+        pass.dispatch_workgroups(walk.groups[0], walk.groups[1], 1);
+        drop(pass);
+        if let Some(hop) = inputs.shared {
+            self.record_list(encoder, resources, inputs, (&walk, hop.lost));
+        }
+        Ok(())
+    }
+
+    /// Records the walk of some paths alone, over what is there.
+    ///
+    /// # Errors
+    /// As [`ImageSpaceTracer::record`].
+    pub fn record_listed(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut ImageSpaceTracerResources,
+        inputs: &ImageSpaceTracerInputs<'_>,
+        list: &PathList,
+    ) -> Result<(), Error> {
+        let whole = ImageSpaceTracerInputs {
+            shared: None,
+            ..*inputs
+        };
+        let Some((walk, maps)) = self.prepare(resources, &whole)? else {
+            return Ok(());
+        };
+        let listed = self.walk.list_group(&mut resources.walk, list);
+        let mut pass = device::compute_pass(encoder, "lightfall::ImageSpaceTracer", inputs.timestamps);
+        pass.set_pipeline(&self.walk_listed);
+        pass.set_bind_group(0, &walk.group, &[]);
+        pass.set_bind_group(1, &maps, &[]);
+        pass.set_bind_group(2, &listed, &[]);
+        pass.dispatch_workgroups_indirect(list.buffer(), 0);
+        Ok(())
+    }
+
+    /// Uniforms and bindings of a walk, and of what it meets.
+    fn prepare(
+        &self,
+        resources: &mut ImageSpaceTracerResources,
+        inputs: &ImageSpaceTracerInputs<'_>,
+    ) -> Result<Option<(PreparedWalk, wgpu::BindGroup)>, Error> {
         let walk = PhotonWalkInputs {
             queue: inputs.queue,
             photons: inputs.photons,
@@ -283,19 +339,8 @@ impl ImageSpaceTracer {
             (inputs.env_maps, inputs.hierarchy),
             inputs.settings,
         )?;
-        let Some(walk) = self.walk.prepare(&mut resources.walk, &walk) else {
-            return Ok(());
-        };
-        let mut pass = device::compute_pass(encoder, "lightfall::ImageSpaceTracer", inputs.timestamps);
-        pass.set_pipeline(&self.walk_pipeline);
-        pass.set_bind_group(0, &walk.group, &[]);
-        pass.set_bind_group(1, &maps, &[]);
-        pass.dispatch_workgroups(walk.groups[0], walk.groups[1], 1);
-        drop(pass);
-        if let Some(hop) = inputs.shared {
-            self.record_list(encoder, resources, inputs, (&walk, hop.lost));
-        }
-        Ok(())
+        let walk = self.walk.prepare(&mut resources.walk, &walk);
+        Ok(walk.map(|walk| (walk, maps)))
     }
 
     /// Records the tracing of a list of rays.
@@ -379,7 +424,7 @@ impl ImageSpaceTracer {
         encoder: &mut wgpu::CommandEncoder,
         resources: &mut ImageSpaceTracerResources,
         inputs: &ImageSpaceTracerInputs<'_>,
-        (walk, lost): (&PreparedWalk, &LostRays),
+        (walk, lost): (&PreparedWalk, &PathList),
     ) {
         let bound = [
             (&walk.params).into(),

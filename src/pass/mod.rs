@@ -28,6 +28,7 @@ pub(crate) mod photon_guiding;
 pub(crate) mod photon_splatter;
 pub(crate) mod photon_stream;
 pub(crate) mod photon_walk;
+pub(crate) mod selective_emitter;
 mod shadow_map_capture;
 pub(crate) mod soft_shadow;
 pub(crate) mod specular_paths;
@@ -76,6 +77,9 @@ pub use photon_splatter::{
 };
 pub use photon_stream::{ImpactLightInputs, PhotonStream, PhotonStreamInputs, PhotonStreamResources};
 pub use photon_walk::SharedHop;
+pub use selective_emitter::{
+    SelectiveEmitter, SelectiveEmitterInputs, SelectiveEmitterResources, SelectiveEmitterSettings,
+};
 pub use shadow_map_capture::{ShadowMapCapture, ShadowMapCaptureInputs, ShadowMapCaptureResources};
 pub(crate) use soft_shadow::{MAX_POINTS, MAX_TAPS};
 pub use soft_shadow::{

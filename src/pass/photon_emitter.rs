@@ -9,8 +9,9 @@
 
 use super::dispatch_64;
 use super::photon_guiding::Guiding;
+use super::photon_walk::LIST_SLOTS;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
-use crate::resource::{Lights, PhotonTargets, Photons, ShadowMaps};
+use crate::resource::{Lights, PathList, PhotonTargets, Photons, ShadowMaps};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -84,6 +85,9 @@ pub struct PhotonEmitter {
     emit: wgpu::ComputePipeline,
     emit_guided: wgpu::ComputePipeline,
     emit_at_targets: wgpu::ComputePipeline,
+    /// Of the list of some photons.
+    list_layout: wgpu::BindGroupLayout,
+    emit_listed: wgpu::ComputePipeline,
 }
 
 /// Uniforms and bind groups.
@@ -91,6 +95,7 @@ pub struct PhotonEmitter {
 pub struct PhotonEmitterResources {
     params: wgpu::Buffer,
     groups: BindGroupCache,
+    list_groups: BindGroupCache,
 }
 
 /// What a frame gives it.
@@ -121,6 +126,7 @@ impl PhotonEmitter {
         let label = "lightfall::PhotonEmitter";
         let layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &SLOTS);
         let spread_layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &SPREAD_SLOTS);
+        let list_layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, &LIST_SLOTS);
         let pipeline = |label, source, entry_point, layouts: &[&wgpu::BindGroupLayout]| {
             let spec = ComputeSpec {
                 label,
@@ -151,8 +157,15 @@ impl PhotonEmitter {
                 "emit_photons_at_targets",
                 &[&layout, &spread_layout],
             ),
+            emit_listed: pipeline(
+                "lightfall::PhotonEmitter::emit_listed",
+                wgsl::PHOTON_EMITTER_LISTED,
+                "emit_listed_photons",
+                &[&layout, &list_layout],
+            ),
             layout,
             spread_layout,
+            list_layout,
         }
     }
 
@@ -163,6 +176,55 @@ impl PhotonEmitter {
         resources: &mut PhotonEmitterResources,
         inputs: &PhotonEmitterInputs<'_>,
     ) {
+        let (group, groups) = self.prepare(resources, inputs);
+        let label = "lightfall::PhotonEmitter";
+        let (pipeline, spread) = match inputs.spread {
+            PhotonSpread::Guided(guiding) if guiding.share() > 0.0 => {
+                (&self.emit_guided, Some(guiding.tables.emission()))
+            }
+            PhotonSpread::Even | PhotonSpread::Guided(_) => (&self.emit, None),
+            PhotonSpread::Targets(targets) => (&self.emit_at_targets, Some(targets.buffer())),
+        };
+        let spread_group = spread.map(|buffer| {
+            let bound = [buffer.into()];
+            resources.groups.get(&self.device, label, &self.spread_layout, &bound)
+        });
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(pipeline);
+        if let Some(spread_group) = &spread_group {
+            pass.set_bind_group(1, spread_group, &[]);
+        }
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(groups[0], groups[1], 1);
+    }
+
+    /// Records the emission of some photons alone, over what is there: evenly spread, whatever `inputs` say.
+    pub fn record_listed(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut PhotonEmitterResources,
+        inputs: &PhotonEmitterInputs<'_>,
+        list: &PathList,
+    ) {
+        let (group, _) = self.prepare(resources, inputs);
+        let label = "lightfall::PhotonEmitter";
+        let bound = [list.buffer().into()];
+        let listed = resources
+            .list_groups
+            .get(&self.device, label, &self.list_layout, &bound);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(&self.emit_listed);
+        pass.set_bind_group(0, &group, &[]);
+        pass.set_bind_group(1, &listed, &[]);
+        pass.dispatch_workgroups_indirect(list.buffer(), 0);
+    }
+
+    /// Uniform and bindings, and workgroups for all photons.
+    fn prepare(
+        &self,
+        resources: &mut PhotonEmitterResources,
+        inputs: &PhotonEmitterInputs<'_>,
+    ) -> (wgpu::BindGroup, [u32; 2]) {
         let (groups, row) = dispatch_64(inputs.photons.count());
         let params = gpu::Params {
             photon_count: inputs.photons.count(),
@@ -185,24 +247,7 @@ impl PhotonEmitter {
         ];
         let label = "lightfall::PhotonEmitter";
         let group = resources.groups.get(&self.device, label, &self.layout, &bound);
-        let (pipeline, spread) = match inputs.spread {
-            PhotonSpread::Guided(guiding) if guiding.share() > 0.0 => {
-                (&self.emit_guided, Some(guiding.tables.emission()))
-            }
-            PhotonSpread::Even | PhotonSpread::Guided(_) => (&self.emit, None),
-            PhotonSpread::Targets(targets) => (&self.emit_at_targets, Some(targets.buffer())),
-        };
-        let spread_group = spread.map(|buffer| {
-            let bound = [buffer.into()];
-            resources.groups.get(&self.device, label, &self.spread_layout, &bound)
-        });
-        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
-        pass.set_pipeline(pipeline);
-        if let Some(spread_group) = &spread_group {
-            pass.set_bind_group(1, spread_group, &[]);
-        }
-        pass.set_bind_group(0, &group, &[]);
-        pass.dispatch_workgroups(groups[0], groups[1], 1);
+        (group, groups)
     }
 }
 
@@ -215,6 +260,8 @@ impl PhotonEmitterResources {
         Ok(Self {
             params: device::uniform_buffer::<gpu::Params>(device, "lightfall::PhotonEmitter::params")?,
             groups: BindGroupCache::default(),
+            // Of probes, and of what these say to trace anew.
+            list_groups: BindGroupCache::for_uses(2),
         })
     }
 

@@ -4,7 +4,7 @@ use super::dispatch_64;
 use super::photon_guiding::Guiding;
 use crate::Error;
 use crate::gpu::{self as device, BindGroupCache, Slot};
-use crate::resource::{GuidingTables, LostRays, Photons};
+use crate::resource::{GuidingTables, PathList, Photons};
 
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
@@ -28,6 +28,9 @@ pub(crate) mod gpu {
 /// Bindings of group 0 of `shaders/pass/photon_walk/walk_photons.wgsl`, in order.
 pub(crate) const SLOTS: [Slot; 3] = [Slot::Uniform, Slot::StorageMut, Slot::Storage];
 
+/// Bindings of group 2 of `shaders/pass/photon_walk/walk_listed.wgsl`.
+pub(crate) const LIST_SLOTS: [Slot; 1] = [Slot::Storage];
+
 /// One hop of a walk that two tracers share. The first walks it for all paths and lists those that it lost; the second
 /// walks it again for these. Then comes the next hop.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +39,7 @@ pub struct SharedHop<'a> {
     /// the tracer's resources have no room for, are left out.
     pub number: u32,
     /// The paths lost at this hop, of those that it has room for.
-    pub lost: &'a LostRays,
+    pub lost: &'a PathList,
 }
 
 /// Group 0 of a tracer's pipelines.
@@ -45,6 +48,8 @@ pub(super) struct PhotonWalk {
     device: wgpu::Device,
     label: &'static str,
     pub(super) layout: wgpu::BindGroupLayout,
+    /// Of the list of some paths.
+    pub(super) list_layout: wgpu::BindGroupLayout,
 }
 
 /// Uniforms and bind groups.
@@ -55,6 +60,7 @@ pub(super) struct PhotonWalkResources {
     /// Bound where no tables guide the walk.
     no_tables: wgpu::Buffer,
     groups: BindGroupCache,
+    list_groups: BindGroupCache,
 }
 
 /// What a tracer's inputs say of the walk.
@@ -83,7 +89,14 @@ impl PhotonWalk {
             device: device.clone(),
             label,
             layout: device::layout(device, label, wgpu::ShaderStages::COMPUTE, &SLOTS),
+            list_layout: device::layout(device, label, wgpu::ShaderStages::COMPUTE, &LIST_SLOTS),
         }
+    }
+
+    /// What says which paths are walked, of some.
+    pub(super) fn list_group(&self, resources: &mut PhotonWalkResources, list: &PathList) -> wgpu::BindGroup {
+        let (groups, layout) = (&mut resources.list_groups, &self.list_layout);
+        groups.get(&self.device, self.label, layout, &[list.buffer().into()])
     }
 
     /// Writes the uniform; `None` for a hop that there is not, or no room for.
@@ -133,6 +146,8 @@ impl PhotonWalkResources {
             .collect::<Result<Vec<_>, _>>()?;
         Ok(Self {
             groups: BindGroupCache::for_uses(params.len()),
+            // Of what two tracers share, or of probes and of what these say to trace anew.
+            list_groups: BindGroupCache::for_uses(2),
             params,
             no_tables: GuidingTables::no_reflection(device, label)?,
         })

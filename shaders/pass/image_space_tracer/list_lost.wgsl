@@ -3,7 +3,7 @@
 
 @group(0) @binding(0) var<uniform> walk: WalkParams;
 @group(0) @binding(1) var<storage, read> photons: array<Photon>;
-@group(0) @binding(2) var<storage, read_write> lost: LostRays;
+@group(0) @binding(2) var<storage, read_write> lost: PathList;
 // Of each block: how many of its paths are lost, then how many of those before it
 @group(0) @binding(3) var<storage, read_write> blocks: array<u32>;
 
@@ -76,7 +76,7 @@ fn sum_blocks(@builtin(local_invocation_index) lane: u32) {
     }
     if lane == LANES - 1u {
         lost.count = before;
-        lost.workgroups = lost_rays_workgroups(before);
+        lost.workgroups = path_list_workgroups(before);
     }
 }
 

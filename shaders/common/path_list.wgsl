@@ -1,6 +1,6 @@
-// Twin of `resource::LostRays`: paths whose hop a tracer could not resolve, in ascending order.
+// Twin of `resource::PathList`: some paths of many.
 
-struct LostRays {
+struct PathList {
     // Of an indirect dispatch with an invocation for each path, 64 to a workgroup
     workgroups: array<u32, 3>,
     count: u32,
@@ -8,7 +8,7 @@ struct LostRays {
 }
 
 // Workgroups for `count` invocations of 64, none above 65535 along an axis.
-fn lost_rays_workgroups(count: u32) -> array<u32, 3> {
+fn path_list_workgroups(count: u32) -> array<u32, 3> {
     let groups = count / 64u + u32(count % 64u > 0u);
     let rows = max(1u, groups / 65535u + u32(groups % 65535u > 0u));
     return array<u32, 3>(groups / rows + u32(groups % rows > 0u), rows, 1u);

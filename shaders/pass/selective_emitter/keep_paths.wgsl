@@ -1,0 +1,17 @@
+// What listed paths were, before they are traced anew.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> photons: array<Photon>;
+@group(0) @binding(2) var<storage, read> listed: PathList;
+@group(0) @binding(3) var<storage, read_write> kept: array<Photon>;
+
+@compute @workgroup_size(64)
+fn keep_paths(@builtin(global_invocation_id) id: vec3u) {
+    let place = id.y * (listed.workgroups[0] * 64u) + id.x;
+    if place >= min(listed.count, params.kept_count) {
+        return;
+    }
+    for (var hop = 0u; hop < params.hop_count; hop++) {
+        kept[hop * params.kept_count + place] = photons[hop * params.path_count + listed.paths[place]];
+    }
+}
