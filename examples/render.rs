@@ -52,7 +52,7 @@ enum Method {
     FinalGather,
     /// By points on surfaces that stand for the light around them
     SurfaceLights,
-    /// Not available yet.
+    /// By irradiance kept at points of surfaces, gathered again where it changes
     IlluminationMaps,
 }
 
@@ -60,7 +60,7 @@ enum Method {
 #[derive(Parser)]
 #[command(
     args_override_self = true,
-    after_help = "Not available yet: --method illumination-maps, --budget-ms, glTF skins."
+    after_help = "Not available yet: --budget-ms, glTF skins."
 )]
 struct Arguments {
     /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, plane, furnace, two-rooms, pillars,
@@ -341,9 +341,6 @@ fn check_available(arguments: &Arguments) -> Result<Component, String> {
     let not_yet = |what: &str| Err(format!("{what}: not available yet"));
     if arguments.budget_ms.is_some() {
         return not_yet("--budget-ms");
-    }
-    if arguments.method == Some(Method::IlluminationMaps) {
-        return not_yet("--method illumination-maps");
     }
     match arguments.component {
         Part::All => Ok(Component::All),

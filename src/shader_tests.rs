@@ -7,7 +7,8 @@ use crate::pass::{
     accumulator, composite, depth_hierarchy_build, direct_light, env_map_lighting, env_map_selector, final_gather,
     fused_composite, glossy_light, image_space_tracer, irradiance_filter, nearest_occluder, photon_emitter,
     photon_grid, photon_guiding, photon_splatter, photon_stream, photon_walk, selective_emitter, soft_shadow,
-    specular_paths, stable_sort, surface_light_shading, tone_map, trace_statistics, upsampler,
+    specular_paths, stable_sort, surface_light_shading, texel_gather, texel_shading, tone_map, trace_statistics,
+    upsampler,
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
@@ -370,6 +371,10 @@ fn twins() -> Vec<Twin> {
         }),
         twin!(wgsl::PHOTON_EMITTER, "EmissionTable", guiding_tables::gpu::EmissionTable { columns, rows }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "ReflectionTable", guiding_tables::gpu::ReflectionTable { columns, rows }),
+        twin!(wgsl::TEXEL_GATHER_SUM, "Params", texel_gather::gpu::Params {
+            texel_count, budget, ray_count, round, threshold, change_scale, flux_of_step, blend, row,
+        }),
+        twin!(wgsl::TEXEL_SHADING, "Params", texel_shading::gpu::Params { factor, reach }),
         twin!(wgsl::SELECTIVE_EMITTER_PROBE, "Params", selective_emitter::gpu::Params {
             path_count, hop_count, light_count, group_count, interval, first_group, round, budget, kept_count,
             position_tolerance, flux_tolerance, moved_low, moved_high,
@@ -378,12 +383,12 @@ fn twins() -> Vec<Twin> {
             first_path, path_count, first_group, group_count,
         }),
         twin!(wgsl::PHOTON_STREAM, "Params", photon_stream::gpu::Params {
-            path_count, hop_count, first_path, pool_count, row, share,
+            path_count, hop_count, first_path, pool_count, row, share, keeps_changes,
         }),
         twin!(wgsl::PHOTON_STREAM_PLACES, "Params", photon_stream::gpu::PlaceParams { slot_count, light_count, row }),
         twin!(wgsl::PHOTON_STREAM_PLACES, "Nearest", surface_lights::gpu::Nearest { distance, slot }),
         twin!(wgsl::PHOTON_STREAM, "Impact", photon_pool::gpu::Impact { light, red, green, blue, offset, pad }),
-        twin!(wgsl::PHOTON_STREAM, "SurfaceLight", surface_lights::gpu::SurfaceLight { position, area, normal, pad }),
+        twin!(wgsl::PHOTON_STREAM, "SurfaceLight", surface_lights::gpu::SurfaceLight { position, area, normal, surface }),
         twin!(wgsl::PHOTON_STREAM, "SurfaceLightGrid", surface_lights::gpu::SurfaceLightGrid {
             origin, cell, cells, count, steps, _pad,
         }),
@@ -515,7 +520,14 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "SpecularPaths" => vec![&specular_paths::ADVANCE_SLOTS],
         "GlossyLight" => vec![&glossy_light::SLOTS],
         "EnvMapLighting" => vec![&env_map_lighting::SLOTS],
-        "PhotonStream" => vec![&photon_stream::STREAM_SLOTS],
+        "PhotonStream" => vec![&photon_stream::STREAM_SLOTS, &photon_walk::LIST_SLOTS],
+        "TexelGather changes" => vec![&texel_gather::CHANGE_SLOTS],
+        "TexelGather due" => vec![&texel_gather::DUE_SLOTS],
+        "TexelGather choice" => vec![&texel_gather::CHOICE_SLOTS],
+        "TexelGather spread" => vec![&texel_gather::SPREAD_SLOTS],
+        "TexelGather sum" => vec![&texel_gather::SUM_SLOTS],
+        "TexelGather blend" => vec![&texel_gather::BLEND_SLOTS],
+        "TexelShading" => vec![&texel_shading::SLOTS],
         "PhotonStream near" => vec![&photon_stream::NEAR_SLOTS],
         "PhotonStream places" => vec![&photon_stream::PLACE_SLOTS],
         "PhotonStream at impacts" => vec![&photon_stream::IMPACT_SLOTS],

@@ -418,11 +418,13 @@ pub(crate) const ENV_MAP_LIGHTING: &str = compose![
 
 pub(crate) const PHOTON_STREAM: &str = compose![
     "pass/photon_stream/stream_impacts.wgsl",
+    "pass/photon_stream/stream_listed.wgsl",
     "pass/photon_stream/impact.wgsl",
-    "pass/photon_stream/nearest_light.wgsl",
+    "common/nearest_surface_light.wgsl",
     "pass/photon_stream/exitant_flux.wgsl",
     "pass/photon_stream/params.wgsl",
     "common/surface_light.wgsl",
+    "common/path_list.wgsl",
     "common/photon.wgsl",
     "common/octahedral.wgsl",
     "common/reflectance.wgsl",
@@ -482,6 +484,7 @@ pub(crate) const SELECTIVE_EMITTER_COMPARE: &str = compose![
 
 pub(crate) const SELECTIVE_EMITTER_CHOOSE: &str = compose![
     "pass/selective_emitter/choose_groups.wgsl",
+    "common/choose_most.wgsl",
     "pass/selective_emitter/groups.wgsl",
     "pass/selective_emitter/params.wgsl",
     "common/path_list.wgsl",
@@ -596,6 +599,63 @@ pub(crate) const FINAL_GATHER_SUM: &str = compose![
     "common/octahedral.wgsl",
     "common/reflectance.wgsl",
     "common/cube_face.wgsl",
+];
+
+pub(crate) const TEXEL_GATHER_CHANGES: &str = compose![
+    "pass/texel_gather/sum_changes.wgsl",
+    "pass/texel_gather/params.wgsl",
+    "common/surface_light.wgsl",
+];
+
+pub(crate) const TEXEL_GATHER_DUE: &str = compose![
+    "pass/texel_gather/mark_due.wgsl",
+    "pass/texel_gather/params.wgsl",
+    "common/surface_light.wgsl",
+];
+
+pub(crate) const TEXEL_GATHER_CHOICE: &str = compose![
+    "pass/texel_gather/choose_texels.wgsl",
+    "pass/texel_gather/params.wgsl",
+    "common/choose_most.wgsl",
+    "common/path_list.wgsl",
+];
+
+pub(crate) const TEXEL_GATHER_SPREAD: &str = compose![
+    "pass/texel_gather/spread_rays.wgsl",
+    "pass/texel_gather/params.wgsl",
+    "common/surface_light.wgsl",
+    "common/path_list.wgsl",
+    "common/surface_rays.wgsl",
+    "common/octahedral.wgsl",
+    "common/sampling.wgsl",
+    "common/halton.wgsl",
+    "common/hash.wgsl",
+];
+
+pub(crate) const TEXEL_GATHER_SUM: &str = compose![
+    "pass/texel_gather/sum_hits.wgsl",
+    "pass/texel_gather/params.wgsl",
+    "common/nearest_surface_light.wgsl",
+    "common/surface_light.wgsl",
+    "common/path_list.wgsl",
+    "common/surface_rays.wgsl",
+    "common/hit.wgsl",
+    "common/lobe.wgsl",
+    "common/octahedral.wgsl",
+];
+
+pub(crate) const TEXEL_GATHER_BLEND: &str =
+    compose!["pass/texel_gather/blend_texels.wgsl", "pass/texel_gather/params.wgsl",];
+
+pub(crate) const TEXEL_SHADING: &str = compose![
+    "pass/texel_shading.wgsl",
+    "common/surface_light.wgsl",
+    "common/receiver_at.wgsl",
+    "common/receiver.wgsl",
+    "common/g_buffer.wgsl",
+    "common/subsampling.wgsl",
+    "common/sampling.wgsl",
+    "common/octahedral.wgsl",
 ];
 
 pub(crate) const IRRADIANCE_FILTER: &str = compose![
@@ -1065,6 +1125,13 @@ pub const MODULES: &[(&str, &str)] = &[
     ("SurfaceLightShading sum", SURFACE_LIGHT_SUM),
     ("FinalGather spread", FINAL_GATHER_SPREAD),
     ("FinalGather sum", FINAL_GATHER_SUM),
+    ("TexelGather changes", TEXEL_GATHER_CHANGES),
+    ("TexelGather due", TEXEL_GATHER_DUE),
+    ("TexelGather choice", TEXEL_GATHER_CHOICE),
+    ("TexelGather spread", TEXEL_GATHER_SPREAD),
+    ("TexelGather sum", TEXEL_GATHER_SUM),
+    ("TexelGather blend", TEXEL_GATHER_BLEND),
+    ("TexelShading", TEXEL_SHADING),
     ("IrradianceFilter", IRRADIANCE_FILTER),
     ("Upsampler", UPSAMPLER),
     ("DirectLight", DIRECT_LIGHT),

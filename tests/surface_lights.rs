@@ -47,6 +47,7 @@ impl Random {
             position: r.within(),
             normal: r.direction(),
             area: 0.02,
+            surface: 0,
         };
         (0..count).map(|_| place(self)).collect()
     }
@@ -711,7 +712,12 @@ fn a_light_gives_what_its_formula_says_near_and_far() {
         (DVec3::new(-0.4, 0.1, 0.1), DVec3::new(1.0, -0.3, 0.2).normalize(), 0.04),
         (DVec3::new(0.3, 0.05, 0.0), DVec3::NEG_X, 0.01),
     ] {
-        let place = SurfacePlace { position, normal, area };
+        let place = SurfacePlace {
+            position,
+            normal,
+            area,
+            surface: 0,
+        };
         for shape in [LightShape::Point, LightShape::Disc, LightShape::Square] {
             let mut worst = 0.0f64;
             let mut sums = [0.0; 2];
@@ -785,6 +791,7 @@ fn what_is_missing_or_bad_is_named() {
         position: DVec3::ZERO,
         normal: DVec3::Y,
         area: 1.0,
+        surface: 0,
     };
     let many = lights.write(queue, &frame, &[place; 3]);
     assert!(

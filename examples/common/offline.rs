@@ -38,6 +38,8 @@ pub(crate) struct Offline<'a> {
     accumulator: Option<(Accumulator, AccumulatorResources)>,
     /// Whether every frame is taken for one of a scene that changes; not while frames are accumulated.
     pub(crate) in_motion: bool,
+    /// Whether no frame was rendered so far.
+    is_first: bool,
     /// Where surface lights stand, if there are any.
     pub(crate) points: Vec<SurfacePoint>,
     scene: Scene,
@@ -68,6 +70,7 @@ impl<'a> Offline<'a> {
         renderer.place_env_maps_blocking(queue, &mut geometry)?;
         let points = match settings.indirect_method {
             IndirectMethod::SurfaceLights => SurfacePoint::place(&scene, settings.surface_lights.places as usize),
+            IndirectMethod::IlluminationMaps => SurfacePoint::place(&scene, settings.illumination_maps.texels as usize),
             _ => Vec::new(),
         };
         let weight = |on: bool| if on { 1.0 } else { 0.0 };
@@ -93,6 +96,7 @@ impl<'a> Offline<'a> {
             geometry,
             bvh,
             in_motion: accumulator.is_none(),
+            is_first: true,
             points,
             accumulator,
             scene,
@@ -146,6 +150,10 @@ impl<'a> Offline<'a> {
         };
         if self.renderer.photon_pool().is_some_and(|pool| pool.share() < 1.0) {
             self.renderer.fill_photon_pool(&scene_inputs)?;
+        }
+        if self.is_first {
+            self.renderer.fill_illumination_map(&scene_inputs)?;
+            self.is_first = false;
         }
         self.renderer.record_scene(&mut encoder, &scene_inputs)?;
         let view_inputs = ViewInputs {

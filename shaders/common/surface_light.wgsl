@@ -6,7 +6,8 @@ struct SurfaceLight {
     // Of the surface that it stands for; 0: it is a point
     area: f32,
     normal: vec3f,
-    pad: u32,
+    // Of its place, and the side
+    surface: u32,
 }
 
 // Where they stand, by cells, and what their flux is counted in.

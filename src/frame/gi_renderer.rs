@@ -28,7 +28,7 @@ use crate::pass::{
 use crate::resource::BvhGeometry;
 use crate::resource::{
     CameraView, CapturePurpose, CaptureView, DepthHierarchy, EnvMapIrradiance, EnvMaps, Environment, GBuffer, Geometry,
-    GuidingTables, Irradiance, MarkedPixels, PhotonGroups, PhotonPool, Photons, PrepareContext, Radiance, ShadowMaps,
+    GuidingTables, IlluminationMap, Irradiance, MarkedPixels, PhotonGroups, PhotonPool, Photons, PrepareContext, Radiance, ShadowMaps,
     Subsampling, SurfaceLights, Visibility,
 };
 use crate::scene::{
@@ -628,6 +628,25 @@ impl GiRenderer {
         if let Some(lights) = self.indirect.as_mut().and_then(IndirectScene::surface_lights_mut) {
             lights.wake();
         }
+        self.submit_rounds(rounds, inputs)
+    }
+
+    /// Gathers all texels of the illumination map at once instead of over many frames: at the start, after a cut. Submits what it
+    /// records and does not wait; call it after `prepare`, before `record_scene`. Nothing where there is no such map.
+    ///
+    /// # Errors
+    /// As [`GiRenderer::record_scene`].
+    pub fn fill_illumination_map(&mut self, inputs: &SceneInputs<'_>) -> Result<(), Error> {
+        #[cfg(feature = "bvh")]
+        self.check_triangles(inputs)?;
+        self.follow_places(inputs.queue)?;
+        let texels = self.illumination_map().map_or(0, |_| 2 * self.surface_places.len() as u32);
+        let a_frame = self.settings.illumination_maps.gather.a_frame.max(1);
+        self.submit_rounds(texels.div_ceil(a_frame), inputs)
+    }
+
+    /// Submits photons, and what is made of them, so many times.
+    fn submit_rounds(&mut self, rounds: u32, inputs: &SceneInputs<'_>) -> Result<(), Error> {
         for round in 0..rounds {
             let mut encoder = self.device.create_command_encoder(&Default::default());
             if round == 0 {
@@ -644,21 +663,34 @@ impl GiRenderer {
 
     /// Puts surface lights where they stand this frame.
     fn follow_places(&mut self, queue: &wgpu::Queue) -> Result<(), Error> {
-        let lights = self.indirect.as_mut().and_then(IndirectScene::surface_lights_mut);
-        let (Some(lights), Some(state)) = (lights, &self.state) else {
+        let (Some(indirect), Some(state)) = (&mut self.indirect, &self.state) else {
             return Ok(());
         };
-        if self.surface_places.is_empty() && self.settings.surface_lights.placement == LightPlacement::OnSurfaces {
+        let at_impacts = self.settings.surface_lights.placement == LightPlacement::AtImpacts;
+        let (stage, needs_places, remedy) = match self.settings.indirect_method {
+            IndirectMethod::SurfaceLights => (
+                "SurfaceLightShading",
+                !at_impacts,
+                "hand them to GiRenderer::set_surface_places, or choose surface_lights.placement = at-impacts",
+            ),
+            _ => (
+                "TexelGather",
+                self.settings.indirect_method.has_places(),
+                "hand them to GiRenderer::set_surface_places",
+            ),
+        };
+        if self.surface_places.is_empty() && needs_places {
             return Err(Error::MissingInput {
-                stage: "SurfaceLightShading",
-                input: "places for surface lights",
-                remedy: "hand them to GiRenderer::set_surface_places, or choose surface_lights.placement = at-impacts",
+                stage,
+                input: "places on surfaces",
+                remedy,
             });
         }
-        lights.follow((&self.device, queue), &state.frame, &self.surface_places)?;
-        match &mut self.indirect {
-            Some(indirect) => indirect.stream(self.streamed),
-            None => Ok(()),
+        let gpu = (&self.device, queue);
+        indirect.follow_places(gpu, (&state.frame, &self.settings), &self.surface_places)?;
+        match self.settings.indirect_method {
+            IndirectMethod::SurfaceLights => indirect.stream(self.streamed),
+            _ => Ok(()),
         }
     }
 
@@ -1001,6 +1033,11 @@ impl GiRenderer {
     /// The photons that they are made of, unless they stand at impacts.
     pub fn photon_pool(&self) -> Option<&PhotonPool> {
         self.indirect.as_ref()?.surface_lights()?.pool()
+    }
+
+    /// Indirect light at texels, while it is kept there.
+    pub fn illumination_map(&self) -> Option<&IlluminationMap> {
+        Some(self.indirect.as_ref()?.illumination()?.map())
     }
 
     /// Photons in groups, while [`Settings::selective`] has them stay until their way changes.

@@ -2,6 +2,7 @@
 
 #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
 use super::PhotonFeeder;
+use super::illumination_scene::IlluminationScene;
 use super::surface_light_scene::SurfaceLightScene;
 use super::traced_photons::{TracedPhotons, WalkInputs};
 use super::{GlossyMethod, IndirectMethod, SceneInputs, Settings, TracerKind};
@@ -13,13 +14,13 @@ use crate::pass::{
     EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources,
     EnvMapLightingSettings, FirstHits, Guiding, GuidingUpdateInputs, GuidingUpdateResources, ImageSpaceTracer,
     PhotonEmitter, PhotonGrid, PhotonGridInputs, PhotonGridResources, PhotonGuiding, PhotonSpread, PhotonStream,
-    SelectiveEmitter, SortedPhotons,
+    SelectiveEmitter, SortedPhotons, TexelGather,
 };
 use crate::resource::{
     CaptureView, DepthHierarchy, EnvMapIrradiance, EnvMaps, GuidingTables, Lights, PhotonGroups, PhotonMap,
     PhotonTargets, Photons, ShadowMaps,
 };
-use crate::scene::{BoundingSphere, UnitFrame};
+use crate::scene::{BoundingSphere, SurfacePlace, UnitFrame};
 
 /// From the lights to the last surface.
 #[derive(Debug)]
@@ -38,8 +39,10 @@ pub(super) struct PhotonPasses {
     pub(super) bvh_tracer: Option<BvhTracer>,
     /// If light is gathered from there.
     env_map_lighting: Option<EnvMapLighting>,
-    /// If light comes from surface lights.
+    /// If light comes from surface lights, or is kept at texels.
     pub(super) photon_stream: Option<PhotonStream>,
+    /// If it comes from illumination maps.
+    pub(super) texel_gather: Option<TexelGather>,
     photon_grid: PhotonGrid,
     /// If the settings light rough metal by photons.
     glossy_grid: Option<PhotonGrid>,
@@ -54,6 +57,8 @@ pub(super) struct IndirectScene {
     image_space: Option<ImageSpaceScene>,
     /// If light comes from there.
     surface_lights: Option<SurfaceLightScene>,
+    /// If light is kept at texels.
+    illumination: Option<Box<IlluminationScene>>,
     /// While caustics have photons of their own, and what these are aimed at.
     caustics: Option<(TracedPhotons, PhotonTargets)>,
     /// While anything specular may be seen.
@@ -116,8 +121,9 @@ impl PhotonPasses {
                 let config = &settings.splatter_config;
                 EnvMapLighting::new(device, config.kernel, config.keeps_to_surfaces)
             }),
-            photon_stream: (settings.indirect_method == IndirectMethod::SurfaceLights)
-                .then(|| PhotonStream::new(device)),
+            photon_stream: settings.indirect_method.has_places().then(|| PhotonStream::new(device)),
+            texel_gather: (settings.indirect_method == IndirectMethod::IlluminationMaps)
+                .then(|| TexelGather::new(device)),
             photon_grid: grid(SortedPhotons::OnDiffuse),
             glossy_grid: (settings.glossy_method == GlossyMethod::Photons).then(|| grid(SortedPhotons::OnGlossy)),
         }
@@ -174,6 +180,9 @@ impl IndirectScene {
             image_space: settings.needs_env_maps().then(image_space).transpose()?,
             surface_lights: (settings.indirect_method == IndirectMethod::SurfaceLights)
                 .then(|| SurfaceLightScene::new(device, settings))
+                .transpose()?,
+            illumination: (settings.indirect_method == IndirectMethod::IlluminationMaps)
+                .then(|| IlluminationScene::new(device, settings).map(Box::new))
                 .transpose()?,
             caustics: None,
             grid: None,
@@ -270,6 +279,28 @@ impl IndirectScene {
         self.surface_lights.as_mut()
     }
 
+    pub(super) fn illumination(&self) -> Option<&IlluminationScene> {
+        self.illumination.as_deref()
+    }
+
+    /// Puts surface lights, or texels, where they stand this frame.
+    pub(super) fn follow_places(
+        &mut self,
+        gpu: (&wgpu::Device, &wgpu::Queue),
+        (frame, settings): (&UnitFrame, &Settings),
+        places: &[SurfacePlace],
+    ) -> Result<(), Error> {
+        if let Some(lights) = &mut self.surface_lights {
+            lights.follow(gpu, frame, places)?;
+        }
+        if let Some(illumination) = &mut self.illumination
+            && illumination.follow(gpu, (frame, settings), places)?
+        {
+            self.global.retrace();
+        }
+        Ok(())
+    }
+
     pub(super) fn caustic_photons(&self) -> Option<&Photons> {
         self.caustics.as_ref().map(|c| &c.0.photons)
     }
@@ -358,9 +389,10 @@ impl IndirectScene {
             maps: env_maps.map(|i| (&i.env_maps, i.hierarchy.as_ref().map(|h| &h.0))),
             sample_offset: scene.sample_offset,
         };
-        match &mut self.surface_lights {
-            None => self.global.record(encoder, passes, &walk_inputs)?,
-            Some(lights) => lights.record(encoder, passes, &mut self.global, walk_inputs)?,
+        match (&mut self.surface_lights, &mut self.illumination) {
+            (Some(lights), _) => lights.record(encoder, passes, &mut self.global, walk_inputs)?,
+            (_, Some(illumination)) => illumination.record(encoder, passes, &mut self.global, &walk_inputs)?,
+            (None, None) => self.global.record(encoder, passes, &walk_inputs)?,
         }
         if let Some((caustics, targets)) = &mut self.caustics {
             walk_inputs.spread = PhotonSpread::Targets(targets);
@@ -444,6 +476,9 @@ impl IndirectScene {
         }
         if let Some(lights) = &self.surface_lights {
             list.push(("surface_lights", lights.memory_use()));
+        }
+        if let Some(illumination) = &self.illumination {
+            list.push(("illumination_maps", illumination.memory_use()));
         }
         if let Some((traced, targets)) = &self.caustics {
             let own = traced.memory_use();

@@ -1,17 +1,15 @@
 //! What a view has of indirect light: the estimate at a part of its pixels, and the levels from there to all of them.
 
 use super::indirect_scene::{IndirectScene, PhotonPasses};
+use super::ray_tracers::{RayTracers, TracedScene};
 use super::surface_light_view::SurfaceLightView;
 use super::{GlossyMethod, IndirectMethod, Settings, Upsampling, ViewInputs};
 use crate::Error;
-#[cfg(feature = "bvh")]
-use crate::pass::{BvhTracerResources, BvhTracerSurfaceRayInputs};
 use crate::pass::{
-    FinalGather, FinalGatherInputs, FinalGatherResources, GlossyLight, ImageSpaceTracerRayInputs,
-    ImageSpaceTracerResources, IrradianceFilter, IrradianceFilterInputs, IrradianceFilterResources,
+    FinalGather, FinalGatherInputs, FinalGatherResources, GlossyLight, IrradianceFilter, IrradianceFilterInputs, IrradianceFilterResources,
     IrradianceFilterSettings, MarkedSplatInputs, PhotonGuidingInputs, PhotonGuidingResources, PhotonSplatter,
     PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings, SpecularPaths, SplatShape,
-    SurfaceLightShading, Upsampler, UpsamplerInputs, UpsamplerResources, progressive_scale,
+    SurfaceLightShading, TexelShading, TexelShadingInputs, TexelShadingResources, Upsampler, UpsamplerInputs, UpsamplerResources, progressive_scale,
 };
 use crate::resource::{GBuffer, Irradiance, Lights, MarkedPixels, Photons, Subsampling, SurfaceRays};
 
@@ -28,6 +26,8 @@ pub(super) struct ViewPasses {
     irradiance_filter: Option<IrradianceFilter>,
     /// If the settings take surface lights.
     pub(super) surface_light_shading: Option<SurfaceLightShading>,
+    /// If they take illumination maps.
+    texel_shading: Option<TexelShading>,
     upsampler: Upsampler,
     pub(super) specular_paths: SpecularPaths,
     /// If the settings light rough metal by photons.
@@ -54,6 +54,7 @@ enum Estimate {
     Splatting(Box<PhotonSplatterResources>),
     FinalGather(Box<GatherView>),
     SurfaceLights(Box<SurfaceLightView>),
+    IlluminationMaps(Box<TexelShadingResources>),
 }
 
 #[derive(Debug)]
@@ -63,15 +64,7 @@ struct GatherView {
     band_rows: u32,
     /// Of each band.
     own: Vec<FinalGatherResources>,
-    tracers: ViewTracers,
-}
-
-/// Of whichever tracer follows a view's rays.
-#[derive(Debug)]
-pub(super) struct ViewTracers {
-    image_space: ImageSpaceTracerResources,
-    #[cfg(feature = "bvh")]
-    bvh: BvhTracerResources,
+    tracers: RayTracers,
 }
 
 /// Irradiance made of that of the level before.
@@ -103,6 +96,22 @@ pub(super) struct IndirectViewInputs<'a> {
     pub(super) counts_guiding: bool,
 }
 
+impl<'a> IndirectViewInputs<'a> {
+    /// What rays of the view meet.
+    pub(super) fn traced_scene(&self) -> TracedScene<'a> {
+        let scene = self.scene;
+        TracedScene {
+            queue: self.view.queue,
+            passes: self.passes.1,
+            settings: self.settings,
+            #[cfg(feature = "bvh")]
+            bvh: self.view.bvh,
+            maps: scene.env_maps().map(|maps| (maps, scene.depth_hierarchy())),
+            timestamps: self.view.timestamps,
+        }
+    }
+}
+
 impl ViewPasses {
     pub(super) fn new(device: &wgpu::Device, settings: &Settings) -> Result<Self, Error> {
         let gathers = settings.indirect_method == IndirectMethod::FinalGather;
@@ -112,6 +121,8 @@ impl ViewPasses {
             irradiance_filter: settings.filters().then(|| IrradianceFilter::new(device)),
             surface_light_shading: (settings.indirect_method == IndirectMethod::SurfaceLights)
                 .then(|| SurfaceLightShading::new(device)),
+            texel_shading: (settings.indirect_method == IndirectMethod::IlluminationMaps)
+                .then(|| TexelShading::new(device)),
             upsampler: Upsampler::new(device),
             specular_paths: SpecularPaths::new(
                 device,
@@ -146,6 +157,9 @@ impl IndirectView {
             IndirectMethod::SurfaceLights => {
                 format = SurfaceLightView::format(device, settings);
                 Estimate::SurfaceLights(Box::new(SurfaceLightView::new(device)?))
+            }
+            IndirectMethod::IlluminationMaps => {
+                Estimate::IlluminationMaps(Box::new(TexelShadingResources::new(device)?))
             }
         };
         let filter = || -> Result<_, Error> {
@@ -222,6 +236,7 @@ impl IndirectView {
             Estimate::Splatting(own) => splat(encoder, own, estimated, inputs),
             Estimate::FinalGather(own) => own.record(encoder, estimated, inputs)?,
             Estimate::SurfaceLights(own) => own.record(encoder, estimated, inputs)?,
+            Estimate::IlluminationMaps(own) => shade_texels(encoder, own, estimated, inputs),
         }
         self.even_out(encoder, inputs);
         self.upsample(encoder, inputs);
@@ -236,7 +251,7 @@ impl IndirectView {
         };
         let near = match &self.estimate {
             Estimate::SurfaceLights(own) => own.near(),
-            Estimate::Splatting(_) | Estimate::FinalGather(_) => None,
+            Estimate::Splatting(_) | Estimate::FinalGather(_) | Estimate::IlluminationMaps(_) => None,
         };
         let plus = near.zip(inputs.scene.surface_lights().map(|s| s.share().recip()));
         let filter_inputs = IrradianceFilterInputs {
@@ -316,6 +331,7 @@ impl IndirectView {
             Estimate::Splatting(own) => ("splatter", own.memory_use()),
             Estimate::FinalGather(own) => ("final_gather", own.memory_use()),
             Estimate::SurfaceLights(own) => ("surface_light_shading", own.memory_use()),
+            Estimate::IlluminationMaps(own) => ("texel_shading", own.memory_use()),
         });
         if let Some((noisy, own)) = &self.filter {
             list.push(("irradiance_filter", noisy.memory_use() + own.memory_use()));
@@ -357,6 +373,29 @@ fn splat(
     inputs.passes.0.photon_splatter.record(encoder, own, &splatter_inputs);
 }
 
+/// Records the light of texels around.
+fn shade_texels(
+    encoder: &mut wgpu::CommandEncoder,
+    own: &mut TexelShadingResources,
+    estimated: &Irradiance,
+    inputs: &IndirectViewInputs<'_>,
+) {
+    let (Some(pass), Some(scene)) = (&inputs.passes.0.texel_shading, inputs.scene.illumination()) else {
+        return;
+    };
+    let shading_inputs = TexelShadingInputs {
+        queue: inputs.view.queue,
+        g_buffer: inputs.g_buffer,
+        subsampling: inputs.settings.subsampling,
+        lights: scene.lights(),
+        map: scene.map(),
+        reach: inputs.settings.illumination_maps.reach,
+        irradiance: estimated,
+        timestamps: inputs.view.timestamps,
+    };
+    pass.record(encoder, own, &shading_inputs);
+}
+
 impl GatherView {
     fn new(device: &wgpu::Device, settings: &Settings, size: [u32; 2]) -> Result<Self, Error> {
         let rays_a_row = u64::from(size[0]) * u64::from(settings.final_gather.rays);
@@ -367,7 +406,7 @@ impl GatherView {
             rays: SurfaceRays::new(device, rays)?,
             band_rows,
             own: own.collect::<Result<_, _>>()?,
-            tracers: ViewTracers::new(device)?,
+            tracers: RayTracers::new(device)?,
         })
     }
 
@@ -400,11 +439,7 @@ impl GatherView {
         };
         for own in &mut self.own {
             pass.record_rays(encoder, own, &gather_inputs);
-            let tracers = RayTracers {
-                rays: &self.rays,
-                own: &mut self.tracers,
-            };
-            tracers.record(encoder, inputs)?;
+            self.tracers.record(encoder, &self.rays, &inputs.traced_scene())?;
             pass.record(encoder, own, &gather_inputs);
             gather_inputs.rows[0] += self.band_rows;
         }
@@ -414,63 +449,6 @@ impl GatherView {
     fn memory_use(&self) -> u64 {
         let own: u64 = self.own.iter().map(FinalGatherResources::memory_use).sum();
         self.rays.memory_use() + own + self.tracers.memory_use()
-    }
-}
-
-/// Rays that one tracer or the other follows.
-pub(super) struct RayTracers<'a> {
-    pub(super) rays: &'a SurfaceRays,
-    pub(super) own: &'a mut ViewTracers,
-}
-
-impl ViewTracers {
-    pub(super) fn new(device: &wgpu::Device) -> Result<Self, Error> {
-        Ok(Self {
-            image_space: ImageSpaceTracerResources::new(device)?,
-            #[cfg(feature = "bvh")]
-            bvh: BvhTracerResources::new(device)?,
-        })
-    }
-
-    pub(super) fn memory_use(&self) -> u64 {
-        let bytes = self.image_space.memory_use();
-        #[cfg(feature = "bvh")]
-        let bytes = bytes + self.bvh.memory_use();
-        bytes
-    }
-}
-
-impl RayTracers<'_> {
-    /// Against triangles if the settings trace any, else through environment maps.
-    pub(super) fn record(
-        self,
-        encoder: &mut wgpu::CommandEncoder,
-        inputs: &IndirectViewInputs<'_>,
-    ) -> Result<(), Error> {
-        let passes = inputs.passes.1;
-        #[cfg(feature = "bvh")]
-        if let (Some(tracer), Some(geometry)) = (&passes.bvh_tracer, inputs.view.bvh) {
-            let ray_inputs = BvhTracerSurfaceRayInputs {
-                queue: inputs.view.queue,
-                geometry,
-                rays: self.rays,
-                timestamps: inputs.view.timestamps,
-            };
-            tracer.record_surface_rays(encoder, &mut self.own.bvh, &ray_inputs);
-            return Ok(());
-        }
-        let (Some(tracer), Some(env_maps)) = (&passes.image_space_tracer, inputs.scene.env_maps()) else {
-            return Ok(());
-        };
-        let ray_inputs = ImageSpaceTracerRayInputs {
-            queue: inputs.view.queue,
-            env_maps,
-            hierarchy: inputs.scene.depth_hierarchy(),
-            rays: self.rays,
-            settings: &inputs.settings.tracer,
-            timestamps: inputs.view.timestamps,
-        };
-        tracer.record_rays(encoder, &mut self.own.image_space, &ray_inputs)
     }
 }
 

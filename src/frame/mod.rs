@@ -7,11 +7,13 @@ mod direct_view;
 mod env_map_placement;
 mod gi_renderer;
 mod guiding_schedule;
+mod illumination_scene;
 mod indirect_scene;
 mod indirect_view;
 #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
 mod photon_feeder;
 mod plan;
+mod ray_tracers;
 mod recapture;
 mod selection_schedule;
 mod selective_photons;
@@ -27,6 +29,6 @@ pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};
 pub use photon_feeder::PhotonFeeder;
 pub use plan::{Plan, PlannedStage, Stage};
 pub use settings::{
-    CausticSettings, FinalGatherSettings, GlossyMethod, IndirectMethod, LightPlacement, SelectiveSettings, Settings,
+    CausticSettings, FinalGatherSettings, GlossyMethod, IlluminationMapSettings, IndirectMethod, LightPlacement, SelectiveSettings, Settings,
     SurfaceLightSettings, TracerKind, Upsampling,
 };

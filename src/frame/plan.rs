@@ -37,14 +37,18 @@ pub enum Stage {
     BvhTracer,
     /// Photons by way of metal and glass alone: aimed, traced and splatted by themselves.
     CausticMap,
-    /// Photons to surface lights.
+    /// Photons to surface lights, or to texels.
     PhotonStream,
+    /// Light at texels, gathered again where it has changed.
+    TexelGather,
     /// Light on what environment maps show.
     EnvMapLighting,
     /// Photons to irradiance.
     PhotonSplatter,
     /// Surface lights to irradiance.
     SurfaceLightShading,
+    /// Texels to irradiance.
+    TexelShading,
     /// What rays bring back from lit environment maps.
     FinalGather,
     /// Noise evened out along surfaces.
@@ -158,9 +162,11 @@ impl Plan {
                 stage(Stage::BvhTracer, bvh),
                 stage(Stage::CausticMap, caustics),
                 stage(Stage::PhotonStream, estimates.streaming),
+                stage(Stage::TexelGather, estimates.texels.clone()),
                 stage(Stage::EnvMapLighting, estimates.gathering.clone()),
                 stage(Stage::PhotonSplatter, estimates.splatting),
                 stage(Stage::SurfaceLightShading, estimates.shading),
+                stage(Stage::TexelShading, estimates.texels),
                 stage(Stage::FinalGather, estimates.gathering),
                 stage(Stage::IrradianceFilter, estimates.filtering),
                 stage(Stage::Upsampler, upsampling),
@@ -264,14 +270,15 @@ fn guiding(indirect: &(bool, String), settings: &Settings) -> (bool, String) {
     }
 }
 
-/// From photons to pixels: the photons around, rays to lit environment maps and a filter of their noise, or surface lights
-/// made of a stream of photons.
+/// From photons to pixels: the photons around, rays to lit environment maps and a filter of their noise, surface lights
+/// made of a stream of photons, or texels that are gathered at where light changes.
 struct Estimates {
     splatting: (bool, String),
     gathering: (bool, String),
     filtering: (bool, String),
     streaming: (bool, String),
     shading: (bool, String),
+    texels: (bool, String),
 }
 
 fn estimates(indirect: &(bool, String), settings: &Settings) -> Estimates {
@@ -289,14 +296,17 @@ fn estimates(indirect: &(bool, String), settings: &Settings) -> Estimates {
     let mut all = Estimates {
         splatting: off(match settings.indirect_method {
             IndirectMethod::FinalGather => "settings gather from lit environment maps",
+            IndirectMethod::IlluminationMaps => "settings take illumination maps",
             _ => "settings take surface lights",
         }),
         gathering: off(match settings.indirect_method {
             IndirectMethod::Splatting => "settings take the photons around",
+            IndirectMethod::IlluminationMaps => "settings take illumination maps",
             _ => "settings take surface lights",
         }),
         filtering: match settings.filter_radius() {
             _ if settings.indirect_method == IndirectMethod::Splatting => off("no noise of rays"),
+            _ if settings.indirect_method == IndirectMethod::IlluminationMaps => off("texels even out noise"),
             0 if settings.keeps_near() && indirect.0 => (true, "adds the photons near by".to_owned()),
             0 => off("settings leave the noise of rays"),
             radius => (
@@ -309,12 +319,24 @@ fn estimates(indirect: &(bool, String), settings: &Settings) -> Estimates {
         },
         streaming: off("settings take no surface lights"),
         shading: off("settings take no surface lights"),
+        texels: off("settings take no illumination maps"),
     };
     if !indirect.0 {
         return all;
     }
     match settings.indirect_method {
         IndirectMethod::Splatting => all.splatting = indirect.clone(),
+        IndirectMethod::IlluminationMaps => {
+            let own = &settings.illumination_maps;
+            all.streaming = (true, format!("a pool of {} paths", settings.traced_photons()));
+            all.texels = (
+                true,
+                format!(
+                    "{} places, {} texels of {} rays a frame at most",
+                    own.texels, own.gather.a_frame, own.gather.rays
+                ),
+            );
+        }
         IndirectMethod::FinalGather => {
             all.gathering = (true, format!("{} rays a pixel", gathers.rays));
         }
@@ -425,6 +447,9 @@ fn simplifications(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
             "diffuse to the eye where there is no indirect light: {}",
             list(&specular)
         ));
+    }
+    if settings.indirect_method == IndirectMethod::IlluminationMaps && !specular.is_empty() {
+        notes.push(format!("seen in {}: light with one bounce less", list(&specular)));
     }
     if settings.indirect_method == IndirectMethod::SurfaceLights && !specular.is_empty() {
         notes.push(format!(

@@ -8,6 +8,16 @@ use crate::pass::{SelectiveEmitter, SelectiveEmitterInputs, SelectiveEmitterReso
 use crate::resource::{PathList, PhotonGroups, Photons};
 use crate::scene::UnitFrame;
 
+/// Which photons were traced.
+pub(super) enum Retraced<'a> {
+    All,
+    Listed(&'a PathList),
+}
+
+/// What is told of the photons that were traced, as soon as that is recorded.
+pub(super) type OnRetraced<'a> =
+    &'a mut dyn FnMut(&mut wgpu::CommandEncoder, &Photons, Retraced<'_>) -> Result<(), Error>;
+
 /// Allocated while the settings want it.
 #[derive(Debug)]
 pub(super) struct SelectivePhotons {
@@ -36,6 +46,7 @@ impl SelectivePhotons {
         (pass, passes): (&SelectiveEmitter, &PhotonPasses),
         traced: &mut TracedPhotons,
         inputs: &WalkInputs<'_>,
+        on_retraced: OnRetraced<'_>,
     ) -> Result<(), Error> {
         let frame = inputs.photons.frame;
         let is_same_frame = self.frame.as_ref().is_some_and(|f| f.maps_like(frame));
@@ -56,14 +67,16 @@ impl SelectivePhotons {
             timestamps: scene.timestamps,
         };
         if !pass.record_probes(encoder, &mut self.own, &mut own_inputs) {
-            return traced.record_all(encoder, passes, inputs);
+            traced.record_all(encoder, passes, inputs)?;
+            return on_retraced(encoder, &photons, Retraced::All);
         }
-        let part = |list: &PathList, traced: &mut TracedPhotons, encoder: &mut wgpu::CommandEncoder| {
-            traced.record_listed(encoder, passes, inputs, list)
-        };
-        part(own_inputs.groups.probes(), traced, encoder)?;
+        let probes = own_inputs.groups.probes();
+        traced.record_listed(encoder, passes, inputs, probes)?;
+        on_retraced(encoder, &photons, Retraced::Listed(probes))?;
         pass.record_choice(encoder, &mut self.own, &own_inputs);
-        part(own_inputs.groups.chosen(), traced, encoder)
+        let chosen = own_inputs.groups.chosen();
+        traced.record_listed(encoder, passes, inputs, chosen)?;
+        on_retraced(encoder, &photons, Retraced::Listed(chosen))
     }
 
     pub(super) fn restart(&mut self) {

@@ -5,7 +5,7 @@ use crate::pass::{
     Bandwidth, BoundaryCorrection, CoverageMeasure, EnvMapSelectorResources, EnvMapSelectorSettings, FirstHits,
     ImageSpaceTracerSettings, IndirectShadows, Kernel, LARGEST_RADIUS, LightForm, LightShape, MAX_POINTS, MAX_SELECTED,
     MAX_TAPS, MOST_FILTER_RADIUS, OccluderTest, PenumbraSearch, PhotonSplatterConfig, PhotonSplatterSettings,
-    SelectiveEmitterSettings, ShadowMethod, SoftShadowSettings, SplatShape, SurfaceLightShadingSettings, TraceMethod,
+    SelectiveEmitterSettings, ShadowMethod, SoftShadowSettings, SplatShape, SurfaceLightShadingSettings, TexelGatherSettings, TraceMethod,
     UpsamplerSettings,
 };
 use crate::resource::{Lights, MAX_LIGHTS, Subsampling};
@@ -57,6 +57,18 @@ pub enum IndirectMethod {
     /// noise of photons; their number is that of lights. It takes places,
     /// [`GiRenderer::set_surface_places`](super::GiRenderer::set_surface_places), or stands them where photons arrive.
     SurfaceLights,
+    /// From irradiance kept at texels of surfaces, which is gathered again only where photons say that it has changed; photons stay until
+    /// their way changes ([`Settings::selective`], whatever it says). Cheapest while little moves; light follows within some
+    /// frames. It takes places for texels, [`GiRenderer::set_surface_places`](super::GiRenderer::set_surface_places). Light has one
+    /// bounce less in mirrors and glass.
+    IlluminationMaps,
+}
+
+impl IndirectMethod {
+    /// Whether it takes places on surfaces.
+    pub(super) fn has_places(self) -> bool {
+        matches!(self, Self::SurfaceLights | Self::IlluminationMaps)
+    }
 }
 
 /// Where surface lights stand.
@@ -130,6 +142,28 @@ impl Default for SelectiveSettings {
             is_on: false,
             group: 40,
             emitter: SelectiveEmitterSettings::default(),
+        }
+    }
+}
+
+/// Irradiance kept at texels of surfaces.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct IlluminationMapSettings {
+    /// Places to choose, 1 to 16384: what a host gives to [`SurfacePoint::place`](crate::scene::SurfacePoint::place), with a texel on either
+    /// side. More resolve more; what follows a change costs in proportion.
+    pub texels: u32,
+    /// How and when they are gathered.
+    pub gather: TexelGatherSettings,
+    /// How far from a pixel texels count, in times that they lie apart, above 0 and up to 8. More is smoother and blurrier.
+    pub reach: f32,
+}
+
+impl Default for IlluminationMapSettings {
+    fn default() -> Self {
+        Self {
+            texels: 1000,
+            gather: TexelGatherSettings::default(),
+            reach: 1.5,
         }
     }
 }
@@ -257,6 +291,8 @@ pub struct Settings {
     pub final_gather: FinalGatherSettings,
     /// Where it comes from surface lights.
     pub surface_lights: SurfaceLightSettings,
+    /// Where it is kept at texels.
+    pub illumination_maps: IlluminationMapSettings,
     /// Light by way of metal and glass alone.
     pub caustic: CausticSettings,
     /// Most specular surfaces that the eye looks through or into one behind the other, 1 to 32: a ball of glass has two. What lies
@@ -363,6 +399,7 @@ impl Settings {
             indirect_method: IndirectMethod::default(),
             final_gather: FinalGatherSettings::default(),
             surface_lights: SurfaceLightSettings::default(),
+            illumination_maps: IlluminationMapSettings::default(),
             caustic: CausticSettings::default(),
             specular_surfaces: 6,
             specular_paths: 4,
@@ -478,16 +515,19 @@ impl Settings {
     pub fn walked_bounces(&self) -> u32 {
         match self.indirect_method {
             IndirectMethod::SurfaceLights if !self.keeps_near() => self.bounces.saturating_sub(1),
+            IndirectMethod::IlluminationMaps => self.bounces.saturating_sub(1),
             _ => self.bounces,
         }
     }
 
     /// Whether photons stay that nothing has changed for.
     pub(super) fn selects_photons(&self) -> bool {
-        self.selective.is_on
-            && self.guided_photons == 0.0
-            && self.indirect_method != IndirectMethod::SurfaceLights
-            && self.photons > 0
+        let is_wanted = match self.indirect_method {
+            IndirectMethod::IlluminationMaps => true,
+            IndirectMethod::SurfaceLights => false,
+            IndirectMethod::Splatting | IndirectMethod::FinalGather => self.selective.is_on,
+        };
+        is_wanted && self.guided_photons == 0.0 && self.photons > 0
     }
 
     /// Whether photons that came a short way stand in for what surface lights lose there.
@@ -509,7 +549,7 @@ impl Settings {
     pub(super) fn filter_radius(&self) -> u32 {
         let lights = &self.surface_lights;
         match self.indirect_method {
-            IndirectMethod::Splatting => 0,
+            IndirectMethod::Splatting | IndirectMethod::IlluminationMaps => 0,
             IndirectMethod::FinalGather => self.final_gather.filter_radius,
             IndirectMethod::SurfaceLights if lights.shading.shadows == IndirectShadows::Some => lights.filter_radius,
             IndirectMethod::SurfaceLights => 0,
@@ -820,7 +860,8 @@ const KNOBS: &[Knob] = &[
         indirect_method,
         ["splatting", IndirectMethod::Splatting],
         ["final-gather", IndirectMethod::FinalGather],
-        ["surface-lights", IndirectMethod::SurfaceLights]
+        ["surface-lights", IndirectMethod::SurfaceLights],
+        ["illumination-maps", IndirectMethod::IlluminationMaps]
     ),
     field!("caustic.photons", "0 to 100000000", caustic.photons, |v| v
         <= 100_000_000),
@@ -868,6 +909,40 @@ const KNOBS: &[Knob] = &[
         ["point", LightShape::Point],
         ["disc", LightShape::Disc],
         ["square", LightShape::Square]
+    ),
+    field!(
+        "illumination_maps.texels",
+        "1 to 16384",
+        illumination_maps.texels,
+        |v| (1..=16384).contains(&v)
+    ),
+    field!(
+        "illumination_maps.a_frame",
+        "1 to 32768: texels",
+        illumination_maps.gather.a_frame,
+        |v| (1..=32768).contains(&v)
+    ),
+    field!("illumination_maps.rays", "1 to 4096", illumination_maps.gather.rays, |v| (
+        1..=4096
+    )
+        .contains(&v)),
+    field!(
+        "illumination_maps.threshold",
+        "0 or more: share of the light",
+        illumination_maps.gather.threshold,
+        |v: f32| v >= 0.0 && v.is_finite()
+    ),
+    field!(
+        "illumination_maps.blend",
+        "above 0, at most 1",
+        illumination_maps.gather.blend,
+        |v: f32| v > 0.0 && v <= 1.0
+    ),
+    field!(
+        "illumination_maps.reach",
+        "above 0, at most 8: times that texels lie apart",
+        illumination_maps.reach,
+        |v: f32| v > 0.0 && v <= 8.0
     ),
     choice!(
         "surface_lights.near_photons",

@@ -1,6 +1,7 @@
 //! What one view sees in mirrors and through glass.
 
-use super::indirect_view::{IndirectViewInputs, MOST_RAYS, RayTracers, ViewTracers};
+use super::indirect_view::{IndirectViewInputs, MOST_RAYS};
+use super::ray_tracers::RayTracers;
 use crate::Error;
 use crate::pass::{GlossyLightInputs, GlossyLightResources, PathShape, SpecularPathsInputs, SpecularPathsResources};
 use crate::resource::{Environment, Irradiance, ShadowMaps, SurfaceRays};
@@ -13,7 +14,7 @@ pub(super) struct SpecularView {
     band_rows: u32,
     /// Of each band.
     own: Vec<SpecularPathsResources>,
-    tracers: ViewTracers,
+    tracers: RayTracers,
     glossy: GlossyLightResources,
     radiance: Irradiance,
 }
@@ -27,7 +28,7 @@ impl SpecularView {
             rays: SurfaceRays::new(device, pixels)?,
             band_rows,
             own: own.collect::<Result<_, _>>()?,
-            tracers: ViewTracers::new(device)?,
+            tracers: RayTracers::new(device)?,
             glossy: GlossyLightResources::new(device)?,
             radiance: Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?,
         })
@@ -72,11 +73,7 @@ impl SpecularView {
             for round in 0..shape.rounds {
                 pass.record_rays(encoder, own, &path_inputs, round);
                 for step in 0..shape.steps {
-                    let tracers = RayTracers {
-                        rays: &self.rays,
-                        own: &mut self.tracers,
-                    };
-                    tracers.record(encoder, inputs)?;
+                    self.tracers.record(encoder, &self.rays, &inputs.traced_scene())?;
                     pass.record(encoder, own, &path_inputs, [round, step]);
                 }
             }

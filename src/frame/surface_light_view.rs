@@ -1,7 +1,8 @@
 //! What a view has of surface lights: their irradiance, with the rays of its shadows, and that of photons near by.
 
 use super::Settings;
-use super::indirect_view::{IndirectViewInputs, MOST_RAYS, RayTracers, ViewTracers};
+use super::indirect_view::{IndirectViewInputs, MOST_RAYS};
+use super::ray_tracers::RayTracers;
 use super::surface_light_scene::SurfaceLightScene;
 use crate::Error;
 use crate::pass::{
@@ -38,7 +39,7 @@ struct Shadows {
     band_rows: u32,
     /// Of each band.
     own: Vec<SurfaceLightShadingResources>,
-    tracers: ViewTracers,
+    tracers: RayTracers,
 }
 
 impl SurfaceLightView {
@@ -118,11 +119,7 @@ impl SurfaceLightView {
                 rows: [index * shadows.band_rows, shadows.band_rows],
             };
             pass.record_rays(encoder, own, &shading_inputs, &band);
-            let tracers = RayTracers {
-                rays: &shadows.rays,
-                own: &mut shadows.tracers,
-            };
-            tracers.record(encoder, inputs)?;
+            shadows.tracers.record(encoder, &shadows.rays, &inputs.traced_scene())?;
             pass.record_shadowed(encoder, own, &shading_inputs, &band)?;
         }
         Ok(())
@@ -186,7 +183,7 @@ impl Shadows {
             rays_a_pixel,
             band_rows,
             own: own.collect::<Result<_, _>>()?,
-            tracers: ViewTracers::new(device)?,
+            tracers: RayTracers::new(device)?,
         })
     }
 }

@@ -1,7 +1,7 @@
 //! A photon map on its way from the lights to the last surface, by whichever tracers the settings choose.
 
 use super::indirect_scene::{PhotonInputs, PhotonPasses};
-use super::selective_photons::SelectivePhotons;
+use super::selective_photons::{OnRetraced, Retraced, SelectivePhotons};
 use super::{Settings, TracerKind};
 use crate::Error;
 #[cfg(feature = "bvh")]
@@ -115,10 +115,22 @@ impl TracedPhotons {
         passes: &PhotonPasses,
         inputs: &WalkInputs<'_>,
     ) -> Result<(), Error> {
+        self.record_selected(encoder, passes, inputs, &mut |_, _, _| Ok(()))
+    }
+
+    /// The same, and tells which.
+    pub(super) fn record_selected(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        passes: &PhotonPasses,
+        inputs: &WalkInputs<'_>,
+        on_retraced: OnRetraced<'_>,
+    ) -> Result<(), Error> {
         let (Some(pass), Some(mut selective)) = (&passes.selective_emitter, self.selective.take()) else {
-            return self.record_all(encoder, passes, inputs);
+            self.record_all(encoder, passes, inputs)?;
+            return on_retraced(encoder, &self.photons, Retraced::All);
         };
-        let recorded = selective.record(encoder, (pass, passes), self, inputs);
+        let recorded = selective.record(encoder, (pass, passes), self, inputs, on_retraced);
         self.selective = Some(selective);
         recorded
     }

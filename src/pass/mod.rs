@@ -34,6 +34,8 @@ pub(crate) mod soft_shadow;
 pub(crate) mod specular_paths;
 pub(crate) mod stable_sort;
 pub(crate) mod surface_light_shading;
+pub(crate) mod texel_gather;
+pub(crate) mod texel_shading;
 pub(crate) mod tone_map;
 pub(crate) mod trace_statistics;
 pub(crate) mod upsampler;
@@ -91,6 +93,8 @@ pub use surface_light_shading::{
     IndirectShadows, LightForm, LightShape, SurfaceLightRays, SurfaceLightShading, SurfaceLightShadingInputs,
     SurfaceLightShadingResources, SurfaceLightShadingSettings,
 };
+pub use texel_gather::{TexelGather, TexelGatherInputs, TexelGatherResources, TexelGatherSettings};
+pub use texel_shading::{TexelShading, TexelShadingInputs, TexelShadingResources};
 pub use tone_map::{ToneCurve, ToneMap, ToneMapInputs, ToneMapResources, ToneMapSettings};
 pub use trace_statistics::{HopStatistics, TraceStatistics, TraceStatisticsInputs, TraceStatisticsResources};
 pub use upsampler::{Upsampler, UpsamplerInputs, UpsamplerResources, UpsamplerSettings};

@@ -13,8 +13,9 @@
 //! of the pool. Limits: diffuse surfaces alone send light on here; what glossy ones reflect is photons' matter.
 
 use super::dispatch_64;
+use super::photon_walk::LIST_SLOTS;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
-use crate::resource::{PhotonPool, Photons, SurfaceLights};
+use crate::resource::{PathList, PhotonPool, Photons, SurfaceLights};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -30,6 +31,7 @@ pub(crate) mod gpu {
         pub(crate) pool_count: u32,
         pub(crate) row: u32,
         pub(crate) share: f32,
+        pub(crate) keeps_changes: u32,
     }
 
     /// Twin of `Params` in `shaders/pass/photon_stream/place_lights.wgsl`.
@@ -43,12 +45,13 @@ pub(crate) mod gpu {
 }
 
 /// Bindings of `shaders/pass/photon_stream/stream_impacts.wgsl`, in order.
-pub(crate) const STREAM_SLOTS: [Slot; 7] = [
+pub(crate) const STREAM_SLOTS: [Slot; 8] = [
     Slot::Uniform,
     Slot::Uniform,
     Slot::Storage,
     Slot::Storage,
     Slot::Storage,
+    Slot::StorageMut,
     Slot::StorageMut,
     Slot::StorageMut,
 ];
@@ -87,6 +90,9 @@ pub struct PhotonStream {
     stream_layout: wgpu::BindGroupLayout,
     impact_layout: wgpu::BindGroupLayout,
     stream: wgpu::ComputePipeline,
+    /// Of the list of some paths.
+    list_layout: wgpu::BindGroupLayout,
+    stream_listed: wgpu::ComputePipeline,
     near_layout: wgpu::BindGroupLayout,
     keep_near: wgpu::ComputePipeline,
     place_layout: wgpu::BindGroupLayout,
@@ -102,6 +108,7 @@ pub struct PhotonStreamResources {
     place_params: wgpu::Buffer,
     place_groups: BindGroupCache,
     stream_groups: BindGroupCache,
+    list_groups: BindGroupCache,
     near_groups: BindGroupCache,
     impact_groups: BindGroupCache,
 }
@@ -141,21 +148,22 @@ impl PhotonStream {
         let stage = wgpu::ShaderStages::COMPUTE;
         let stream_layout = device::layout(device, "lightfall::PhotonStream", stage, &STREAM_SLOTS);
         let impact_layout = device::layout(device, "lightfall::PhotonStream::impacts", stage, &IMPACT_SLOTS);
+        let list_layout = device::layout(device, "lightfall::PhotonStream::list", stage, &LIST_SLOTS);
         let near_layout = device::layout(device, "lightfall::PhotonStream::near", stage, &NEAR_SLOTS);
         let place_layout = device::layout(device, "lightfall::PhotonStream::places", stage, &PLACE_SLOTS);
-        let pipeline = |label, source, entry_point, layout| {
+        let pipeline = |label, source, entry_point, layouts: &[&wgpu::BindGroupLayout]| {
             let spec = ComputeSpec {
                 label,
                 source,
                 entry_point,
-                layouts: &[layout],
+                layouts,
                 constants: &[],
             };
             device::compute_pipeline(device, &spec)
         };
         let places = ["find_distances", "find_slots", "place_lights"].map(|entry_point| {
             let source = wgsl::PHOTON_STREAM_PLACES;
-            pipeline("lightfall::PhotonStream::places", source, entry_point, &place_layout)
+            pipeline("lightfall::PhotonStream::places", source, entry_point, &[&place_layout])
         });
         Self {
             device: device.clone(),
@@ -163,22 +171,29 @@ impl PhotonStream {
                 "lightfall::PhotonStream",
                 wgsl::PHOTON_STREAM,
                 "stream_impacts",
-                &stream_layout,
+                &[&stream_layout],
+            ),
+            stream_listed: pipeline(
+                "lightfall::PhotonStream::listed",
+                wgsl::PHOTON_STREAM,
+                "stream_listed",
+                &[&stream_layout, &list_layout],
             ),
             keep_near: pipeline(
                 "lightfall::PhotonStream::near",
                 wgsl::PHOTON_STREAM_NEAR,
                 "keep_near",
-                &near_layout,
+                &[&near_layout],
             ),
             places,
             at_impacts: pipeline(
                 "lightfall::PhotonStream::impacts",
                 wgsl::PHOTON_STREAM_AT_IMPACTS,
                 "lights_at_impacts",
-                &impact_layout,
+                &[&impact_layout],
             ),
             stream_layout,
+            list_layout,
             near_layout,
             place_layout,
             impact_layout,
@@ -195,65 +210,21 @@ impl PhotonStream {
         resources: &mut PhotonStreamResources,
         inputs: &mut PhotonStreamInputs<'_>,
     ) -> Result<(), Error> {
-        let (photons, pool) = (inputs.photons, &mut *inputs.pool);
-        let paths = photons.count();
-        // What arrives last is of use near by alone.
-        let hops = photons.bounces() + u32::from(pool.near().is_none());
-        for (what, expected, found, is_bad) in [
-            (
-                "photons to stream (most that the pool holds)",
-                pool.paths(),
-                paths,
-                paths > pool.paths(),
-            ),
-            (
-                "hops of photons to stream (as many as the pool has; one more where it keeps those near by)",
-                pool.hops(),
-                hops,
-                hops != pool.hops(),
-            ),
-        ] {
-            if is_bad {
-                let (expected, found) = (expected as usize, found as usize);
-                return Err(Error::CountMismatch { what, expected, found });
-            }
-        }
-        let (first_path, is_stale) = pool.advance(photons.count());
+        let (paths, hops) = checked_paths(inputs, inputs.photons.count() > inputs.pool.paths())?;
+        let (first_path, is_stale) = inputs.pool.advance(paths);
         if is_stale {
-            encoder.clear_buffer(pool.buffer(), 0, None);
-            if let Some(near) = pool.near() {
+            encoder.clear_buffer(inputs.pool.buffer(), 0, None);
+            if let Some(near) = inputs.pool.near() {
                 encoder.clear_buffer(near.buffer(), 0, None);
             }
             inputs.lights.clear_flux(encoder);
         }
-        if photons.count() == 0 || inputs.lights.count() == 0 {
+        if paths == 0 || inputs.lights.count() == 0 {
             return Ok(());
         }
         let (groups, row) = dispatch_64(paths * hops);
-        let params = gpu::Params {
-            path_count: paths,
-            hop_count: hops,
-            first_path,
-            pool_count: pool.paths(),
-            row,
-            share: (f64::from(photons.count()) / f64::from(pool.paths())) as f32,
-        };
-        inputs
-            .queue
-            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
-        let bound = [
-            (&resources.params).into(),
-            inputs.lights.grid().into(),
-            photons.buffer().into(),
-            inputs.lights.records().into(),
-            inputs.lights.cells().into(),
-            pool.buffer().into(),
-            inputs.lights.flux().into(),
-        ];
+        let group = self.stream_group(resources, inputs, [hops, first_path, row]);
         let label = "lightfall::PhotonStream";
-        let group = resources
-            .stream_groups
-            .get(&self.device, label, &self.stream_layout, &bound);
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
         pass.set_pipeline(&self.stream);
         pass.set_bind_group(0, &group, &[]);
@@ -262,6 +233,71 @@ impl PhotonStream {
         self.record_near(encoder, resources, inputs, groups);
         self.record_places(encoder, resources, inputs);
         Ok(())
+    }
+
+    /// Records that some of the paths have become other ones, where the pool holds all photons that there are: nothing else of it
+    /// changes. Follow it with [`PhotonStream::record_places`].
+    ///
+    /// # Errors
+    /// [`Error::CountMismatch`] for another number of paths than the pool holds, or of hops; nothing is recorded then.
+    pub fn record_listed(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        resources: &mut PhotonStreamResources,
+        inputs: &PhotonStreamInputs<'_>,
+        list: &PathList,
+    ) -> Result<(), Error> {
+        let (_, hops) = checked_paths(inputs, inputs.photons.count() != inputs.pool.paths())?;
+        if inputs.lights.count() == 0 {
+            return Ok(());
+        }
+        let group = self.stream_group(resources, inputs, [hops, 0, 0]);
+        let label = "lightfall::PhotonStream";
+        let bound = [list.buffer().into()];
+        let listed = resources
+            .list_groups
+            .get(&self.device, label, &self.list_layout, &bound);
+        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        pass.set_pipeline(&self.stream_listed);
+        pass.set_bind_group(0, &group, &[]);
+        pass.set_bind_group(1, &listed, &[]);
+        pass.dispatch_workgroups_indirect(list.buffer(), 0);
+        Ok(())
+    }
+
+    /// Uniform and bindings of an exchange.
+    fn stream_group(
+        &self,
+        resources: &mut PhotonStreamResources,
+        inputs: &PhotonStreamInputs<'_>,
+        [hops, first_path, row]: [u32; 3],
+    ) -> wgpu::BindGroup {
+        let params = gpu::Params {
+            path_count: inputs.photons.count(),
+            hop_count: hops,
+            first_path,
+            pool_count: inputs.pool.paths(),
+            row,
+            share: (f64::from(inputs.photons.count()) / f64::from(inputs.pool.paths())) as f32,
+            keeps_changes: u32::from(inputs.pool.notes_changes()),
+        };
+        inputs
+            .queue
+            .write_buffer(&resources.params, 0, bytemuck::bytes_of(&params));
+        let bound = [
+            (&resources.params).into(),
+            inputs.lights.grid().into(),
+            inputs.photons.buffer().into(),
+            inputs.lights.records().into(),
+            inputs.lights.cells().into(),
+            inputs.pool.buffer().into(),
+            inputs.lights.flux().into(),
+            inputs.lights.changes().into(),
+        ];
+        let label = "lightfall::PhotonStream";
+        resources
+            .stream_groups
+            .get(&self.device, label, &self.stream_layout, &bound)
     }
 
     /// Records what is kept of new paths near by, behind their exchange and with its uniform.
@@ -360,6 +396,7 @@ impl PhotonStream {
             pool_count: photons.count(),
             row,
             share: 1.0,
+            keeps_changes: 0,
         };
         inputs
             .queue
@@ -383,6 +420,34 @@ impl PhotonStream {
     }
 }
 
+/// Paths and hops whose light goes on.
+fn checked_paths(inputs: &PhotonStreamInputs<'_>, is_other_number: bool) -> Result<(u32, u32), Error> {
+    let (photons, pool) = (inputs.photons, &*inputs.pool);
+    let paths = photons.count();
+    // What arrives last is of use near by alone.
+    let hops = photons.bounces() + u32::from(pool.near().is_none());
+    for (what, expected, found, is_bad) in [
+        (
+            "photons to stream (what the pool holds)",
+            pool.paths(),
+            paths,
+            is_other_number,
+        ),
+        (
+            "hops of photons to stream (as many as the pool has; one more where it keeps those near by)",
+            pool.hops(),
+            hops,
+            hops != pool.hops(),
+        ),
+    ] {
+        if is_bad {
+            let (expected, found) = (expected as usize, found as usize);
+            return Err(Error::CountMismatch { what, expected, found });
+        }
+    }
+    Ok((paths, hops))
+}
+
 impl PhotonStreamResources {
     /// Resources on this device.
     ///
@@ -394,6 +459,8 @@ impl PhotonStreamResources {
             place_params: device::uniform_buffer::<gpu::PlaceParams>(device, "lightfall::PhotonStream::place_params")?,
             place_groups: BindGroupCache::default(),
             stream_groups: BindGroupCache::default(),
+            // Of probes, and of what these say to trace anew.
+            list_groups: BindGroupCache::for_uses(2),
             near_groups: BindGroupCache::default(),
             impact_groups: BindGroupCache::default(),
         })

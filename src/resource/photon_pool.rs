@@ -32,6 +32,7 @@ pub struct PhotonPool {
     /// Paths that were streamed since the last restart.
     streamed: u64,
     is_stale: bool,
+    notes_changes: bool,
     /// If what discs lose near by is kept.
     near: Option<Photons>,
 }
@@ -58,6 +59,7 @@ impl PhotonPool {
             next: 0,
             streamed: 0,
             is_stale: false,
+            notes_changes: false,
             near: None,
         })
     }
@@ -72,6 +74,15 @@ impl PhotonPool {
         self.near = Some(Photons::of_indirect_light(device, self.paths)?);
         self.restart();
         Ok(())
+    }
+
+    /// Has lights note what comes and goes from now on ([`SurfaceLights::changes`](super::SurfaceLights::changes)).
+    pub fn note_changes(&mut self) {
+        self.notes_changes = true;
+    }
+
+    pub(crate) fn notes_changes(&self) -> bool {
+        self.notes_changes
     }
 
     /// What lights that are discs lose near by, one photon a path or none, for

@@ -17,7 +17,7 @@ pub(crate) mod gpu {
         pub(crate) position: [f32; 3],
         pub(crate) area: f32,
         pub(crate) normal: [f32; 3],
-        pub(crate) pad: u32,
+        pub(crate) surface: u32,
     }
 
     /// Twin of `Nearest` in `shaders/pass/photon_stream/place_lights.wgsl`.
@@ -42,7 +42,7 @@ pub(crate) mod gpu {
 }
 
 /// Lights on surfaces, two at each place, one for either side: light 2 i on the side that its normal points to. Storage
-/// buffers: 32 bytes a light (position, area, normal, 0; unit frame), where it stands and where it shines from, and its flux,
+/// buffers: 32 bytes a light (position, area, normal, number of its surface and side; unit frame), where it stands and where it shines from, and its flux,
 /// red, green and blue as whole numbers of [`SurfaceLights::flux_of_step`], with the number of photons that it is of. Filled by
 /// [`PhotonStream`](crate::pass::PhotonStream), shone by [`SurfaceLightShading`](crate::pass::SurfaceLightShading).
 #[derive(Debug)]
@@ -53,6 +53,9 @@ pub struct SurfaceLights {
     shining: wgpu::Buffer,
     nearest: wgpu::Buffer,
     flux: wgpu::Buffer,
+    changes: wgpu::Buffer,
+    /// Of each surface's side, unit frame.
+    surface_areas: Vec<f32>,
     cells: wgpu::Buffer,
     grid: wgpu::Buffer,
     written: Vec<gpu::SurfaceLight>,
@@ -66,7 +69,7 @@ impl SurfaceLights {
     /// Bytes for so many places.
     pub fn size_in_bytes(places: u32) -> u64 {
         let lights = u64::from(lights_of(places));
-        lights * (2 * size_of::<gpu::SurfaceLight>() as u64 + size_of::<gpu::Nearest>() as u64 + 16)
+        lights * (2 * size_of::<gpu::SurfaceLight>() as u64 + size_of::<gpu::Nearest>() as u64 + 16 + 8)
             + cells_bytes(places)
             + size_of::<gpu::SurfaceLightGrid>() as u64
     }
@@ -89,6 +92,8 @@ impl SurfaceLights {
                 lights * size_of::<gpu::Nearest>() as u64,
             )?,
             flux: storage("lightfall::SurfaceLights::flux", 16 * lights)?,
+            changes: storage("lightfall::SurfaceLights::changes", 8 * lights)?,
+            surface_areas: Vec::new(),
             cells: storage("lightfall::SurfaceLights::cells", cells_bytes(places))?,
             grid: device::uniform_buffer::<gpu::SurfaceLightGrid>(device, "lightfall::SurfaceLights::grid")?,
             written: Vec::new(),
@@ -121,12 +126,15 @@ impl SurfaceLights {
             let problem = "has a position or an area that is not finite, or a normal that is not of length one";
             return Err(Error::scene("surface light", format!("#{index}"), "place", problem));
         }
+        let mut numbers = std::collections::BTreeMap::new();
         let sides = |p: &SurfacePlace| {
-            [1.0, -1.0].map(|side| gpu::SurfaceLight {
+            let next = 2 * numbers.len() as u32;
+            let surface = *numbers.entry(p.surface).or_insert(next);
+            [(1.0, 0), (-1.0, 1)].map(|(side, back)| gpu::SurfaceLight {
                 position: frame.point(p.position).to_array(),
                 area: frame.area(p.area),
                 normal: (side * p.normal).as_vec3().to_array(),
-                pad: 0,
+                surface: surface + back,
             })
         };
         let records: Vec<_> = places.iter().flat_map(sides).collect();
@@ -140,6 +148,10 @@ impl SurfaceLights {
         queue.write_buffer(&self.cells, 0, bytemuck::cast_slice(&cells));
         queue.write_buffer(&self.grid, 0, bytemuck::bytes_of(&grid));
         self.count = records.len() as u32;
+        self.surface_areas = vec![0.0; 2 * numbers.len()];
+        records
+            .iter()
+            .for_each(|r| self.surface_areas[r.surface as usize] += r.area);
         self.written = records;
         Ok(true)
     }
@@ -158,6 +170,7 @@ impl SurfaceLights {
     /// Takes all flux from them.
     pub(crate) fn clear_flux(&self, encoder: &mut wgpu::CommandEncoder) {
         encoder.clear_buffer(&self.flux, 0, None);
+        encoder.clear_buffer(&self.changes, 0, None);
     }
 
     /// Where the lights stand, 32 bytes each.
@@ -178,6 +191,18 @@ impl SurfaceLights {
     /// Of the lights, 16 bytes each: red, green, blue, photons.
     pub fn flux(&self) -> &wgpu::Buffer {
         &self.flux
+    }
+
+    /// Of the lights, two `u32` each: the flux that came and went where a pool notes that
+    /// ([`PhotonPool::note_changes`](super::PhotonPool::note_changes)), sums over channels in 16 steps, and of that the part that had been scattered before
+    /// it arrived; until whoever uses it sets it to 0.
+    pub fn changes(&self) -> &wgpu::Buffer {
+        &self.changes
+    }
+
+    /// Area of each side of each surface that lights stand on, unit frame, by the number in a light's record.
+    pub(crate) fn surface_areas(&self) -> &[f32] {
+        &self.surface_areas
     }
 
     pub(crate) fn cells(&self) -> &wgpu::Buffer {
@@ -209,6 +234,7 @@ impl SurfaceLights {
             + self.shining.size()
             + self.nearest.size()
             + self.flux.size()
+            + self.changes.size()
             + self.cells.size()
             + self.grid.size()
     }
@@ -277,7 +303,7 @@ mod tests {
             position: [(i as f32 * 0.37).sin(), (i as f32 * 0.11).cos(), i as f32 * 0.01 - 0.5],
             area: 0.02,
             normal: [0.0, 1.0, 0.0],
-            pad: 0,
+            surface: 0,
         };
         let records: Vec<_> = (0..200).map(record).collect();
         let (grid, cells) = cells_of(&records, 1.0);

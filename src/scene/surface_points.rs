@@ -2,7 +2,7 @@
 
 use super::{Instance, Mesh, Scene};
 use crate::halton::radical_inverse;
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, IVec3, Vec3};
 
 /// Share of a triangle's extent that points are placed in, around its centroid: they stay away from its edges.
 const SHRUNK: f64 = 0.9;
@@ -13,6 +13,19 @@ const TOO_MANY: f64 = 3.0;
 
 /// No more than so many, and the paper's tenth: time grows as the square.
 const MOST_TOO_MANY: usize = 3000;
+
+/// Samples that the area around a point is taken from.
+const SAMPLES_A_CELL: f64 = 256.0;
+
+/// No more of an instance.
+const MOST_SAMPLES: u32 = 1 << 20;
+
+/// The least area of a point, as a share of the mean.
+const LEAST_CELL: f64 = 0.02;
+
+/// Twins of `SAME_WAY` and `OFF_PLANE` in `shaders/common/nearest_surface_light.wgsl`.
+const SAME_WAY: f64 = 0.5;
+const OFF_PLANE: f64 = 30.0;
 
 /// A point of a surface, fixed to its instance, and how much surface it stands for. Placed once; moves with the instance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,6 +38,8 @@ pub struct SurfacePoint {
     pub normal: Vec3,
     /// World units squared, one side.
     pub area: f64,
+    /// As in [`SurfacePlace`]: [`Instance::surface`], or of an instance without one a number of its own above those.
+    pub surface: u32,
 }
 
 impl SurfacePoint {
@@ -41,24 +56,19 @@ impl SurfacePoint {
         let sampled: Vec<_> = scene
             .instances
             .iter()
-            .map(|i| SampledInstance::new(&scene.meshes[i.mesh], i))
+            .enumerate()
+            .map(|(index, i)| SampledInstance::new(&scene.meshes[i.mesh], (index, i)))
             .collect();
         let most = count + ((TOO_MANY * count as f64) as usize).min(MOST_TOO_MANY + count / 10);
         let mut placed = Vec::new();
         for (instance, number) in quotas(&sampled, most).into_iter().enumerate() {
             let sampled = &sampled[instance];
-            placed.extend((0..number).map(|i| sampled.point(instance, i as u32 + 1)));
+            placed.extend((0..number).map(|i| sampled.point(instance, i as u32 + 1, SHRUNK)));
         }
         thin_out(&mut placed, count);
-        let mut numbers = vec![0usize; sampled.len()];
-        placed.iter().for_each(|p| numbers[p.point.instance] += 1);
-        placed
-            .into_iter()
-            .map(|p| Self {
-                area: sampled[p.point.instance].area / numbers[p.point.instance] as f64,
-                ..p.point
-            })
-            .collect()
+        let areas = cell_areas(&sampled, &placed);
+        let with_area = |(p, area): (Placed, f64)| Self { area, ..p.point };
+        placed.into_iter().zip(areas).map(with_area).collect()
     }
 
     /// Where it is in the world, under its instance's transform.
@@ -68,6 +78,7 @@ impl SurfacePoint {
             position: transform.transform_point3(self.position.as_dvec3()),
             normal: (normals * self.normal.as_dvec3()).normalize_or(DVec3::Y),
             area: self.area,
+            surface: self.surface,
         }
     }
 }
@@ -81,6 +92,9 @@ pub struct SurfacePlace {
     pub normal: DVec3,
     /// World units squared.
     pub area: f64,
+    /// Which surface it is on: places of the same number are updated together where light is kept
+    /// ([`IlluminationMap`](crate::resource::IlluminationMap)).
+    pub surface: u32,
 }
 
 /// Cofactors: what takes normals along.
@@ -95,6 +109,7 @@ fn normal_matrix(m: &DMat3) -> DMat3 {
 /// An instance's triangles by area.
 struct SampledInstance<'a> {
     mesh: &'a Mesh,
+    surface: u32,
     transform: DAffine3,
     /// World area up to and with each triangle.
     until: Vec<f64>,
@@ -108,7 +123,7 @@ struct Placed {
 }
 
 impl<'a> SampledInstance<'a> {
-    fn new(mesh: &'a Mesh, instance: &Instance) -> Self {
+    fn new(mesh: &'a Mesh, (index, instance): (usize, &Instance)) -> Self {
         let mut area = 0.0;
         let corners = |t: &[u32]| [0, 1, 2].map(|i| DVec3::from(Vec3::from(mesh.positions[t[i] as usize])));
         let until = mesh
@@ -123,14 +138,18 @@ impl<'a> SampledInstance<'a> {
             .collect();
         Self {
             mesh,
+            surface: match instance.surface {
+                0 => u32::from(u16::MAX) + 1 + index as u32,
+                surface => u32::from(surface),
+            },
             transform: instance.transform,
             until,
             area,
         }
     }
 
-    /// The i-th of its points.
-    fn point(&self, instance: usize, i: u32) -> Placed {
+    /// The i-th of its points, in triangles shrunk to so much of their extent.
+    fn point(&self, instance: usize, i: u32, extent: f64) -> Placed {
         let [u, v, w] = [2, 3, 5].map(|base| radical_inverse(i, base));
         let at = u * self.area;
         let triangle = self
@@ -148,14 +167,80 @@ impl<'a> SampledInstance<'a> {
         let within = (1.0 - root) * a + root * (1.0 - w) * b + root * w * c;
         let point = SurfacePoint {
             instance,
-            position: (middle + SHRUNK * (within - middle)).as_vec3(),
+            position: (middle + extent * (within - middle)).as_vec3(),
             normal: (b - a).cross(c - a).normalize_or(DVec3::Y).as_vec3(),
             area: 0.0,
+            surface: self.surface,
         };
         Placed {
             point,
             place: point.in_world(&self.transform),
         }
+    }
+}
+
+/// How much surface lies nearer to each point than to any other that faces the same way, as surface lights see it: from a number of
+/// samples for each point, spread by area.
+fn cell_areas(instances: &[SampledInstance<'_>], placed: &[Placed]) -> Vec<f64> {
+    let total: f64 = instances.iter().map(|i| i.area).sum();
+    let mut areas = vec![0.0; placed.len()];
+    if placed.is_empty() || total <= 0.0 {
+        return areas;
+    }
+    let cells = Cells::new(placed, (total / placed.len() as f64).sqrt());
+    for (index, instance) in instances.iter().enumerate() {
+        let share = instance.area / total * placed.len() as f64;
+        let count = ((SAMPLES_A_CELL * share).ceil() as u32).min(MOST_SAMPLES);
+        for i in 0..count {
+            let sample = instance.point(index, i + 1, 1.0).place;
+            areas[cells.nearest(placed, &sample)] += instance.area / f64::from(count);
+        }
+    }
+    // Hidden between others: a little, not nothing.
+    let least = LEAST_CELL * total / placed.len() as f64;
+    areas.iter_mut().for_each(|area| *area = area.max(least));
+    areas
+}
+
+/// Points by cells of space.
+struct Cells {
+    side: f64,
+    points: std::collections::HashMap<IVec3, Vec<usize>>,
+}
+
+impl Cells {
+    fn new(placed: &[Placed], side: f64) -> Self {
+        let mut points = std::collections::HashMap::<_, Vec<_>>::new();
+        for (index, p) in placed.iter().enumerate() {
+            let cell = (p.place.position / side).floor().as_ivec3();
+            points.entry(cell).or_default().push(index);
+        }
+        Self { side, points }
+    }
+
+    /// The point that is nearest to a place and faces the same way, distances off the place's plane counted as surface lights do;
+    /// the nearest of all where none does.
+    fn nearest(&self, placed: &[Placed], own: &SurfacePlace) -> usize {
+        let cost = |&point: &usize| {
+            let away = placed[point].place.position - own.position;
+            let is_facing = placed[point].place.normal.dot(own.normal) >= SAME_WAY;
+            let apart = if is_facing { 0.0 } else { f64::MAX / 4.0 };
+            away.length_squared() + OFF_PLANE * away.dot(own.normal).powi(2) + apart
+        };
+        let middle = (own.position / self.side).floor().as_ivec3();
+        for rings in 1..=3 {
+            let width = 2 * rings + 1;
+            let around = (0..width.pow(3)).map(|i| IVec3::new(i % width, i / width % width, i / width.pow(2)) - rings);
+            let near = around.filter_map(|cell| self.points.get(&(middle + cell))).flatten();
+            let found = near.min_by(|a, b| cost(a).total_cmp(&cost(b)));
+            // Whatever lies in other cells is this far away at least.
+            let reach = (f64::from(rings) * self.side).powi(2);
+            if let Some(found) = found.filter(|f| cost(f) <= reach) {
+                return *found;
+            }
+        }
+        let all = 0..placed.len();
+        all.min_by(|a, b| cost(a).total_cmp(&cost(b))).unwrap_or(0)
     }
 }
 
@@ -274,7 +359,8 @@ mod tests {
         let sampled: Vec<_> = scene
             .instances
             .iter()
-            .map(|i| SampledInstance::new(&scene.meshes[i.mesh], i))
+            .enumerate()
+            .map(|(index, i)| SampledInstance::new(&scene.meshes[i.mesh], (index, i)))
             .collect();
         let total: f64 = sampled.iter().map(|s| s.area).sum();
         let mut word = 12345u64;

@@ -12,4 +12,6 @@ struct Params {
     row: u32,
     // Share of the pool that the new paths are: what the flux of each is multiplied by
     share: f32,
+    // 1: what comes and goes is noted
+    keeps_changes: u32,
 }

@@ -1,6 +1,6 @@
-// New paths replace the oldest of the pool: what these had sent on is taken from their lights, and what those send on goes to the
-// lights nearest to where they arrived. One invocation an impact. All of it is whole numbers, so that a light holds the sum of
-// the impacts that point to it, exactly and for good.
+// New paths replace the oldest of the pool, or some of its paths are replaced by what has become of them: what was sent on is taken from
+// the lights, and what is goes to the lights nearest to where it arrived. All of it is whole numbers, so that a light holds the sum
+// of the impacts that point to it, exactly and for good.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> grid: SurfaceLightGrid;
@@ -10,35 +10,68 @@
 @group(0) @binding(5) var<storage, read_write> pool: array<Impact>;
 // Of each light red, green, blue, and how many impacts
 @group(0) @binding(6) var<storage, read_write> flux: array<array<atomic<u32>, 4>>;
+// Of each light what came and went, and of that what had been scattered before
+@group(0) @binding(7) var<storage, read_write> changes: array<array<atomic<u32>, 2>>;
 
+// Changes are counted in 2^4 steps of flux, so that many frames of them fit.
+const CHANGE_SHIFT: u32 = 4u;
+
+fn note_change(impact: Impact, is_indirect: bool) {
+    let change = (impact.red >> CHANGE_SHIFT) + (impact.green >> CHANGE_SHIFT) + (impact.blue >> CHANGE_SHIFT);
+    atomicAdd(&changes[impact.light][0], change);
+    if is_indirect {
+        atomicAdd(&changes[impact.light][1], change);
+    }
+}
+
+// What an impact counts for, if anything.
+fn impact_of(photon: Photon, slot: u32) -> Impact {
+    let sent_on = flux_steps(exitant_flux(photon) * params.share, slot);
+    if all(sent_on == vec3u(0u)) {
+        return Impact();
+    }
+    let light = nearest_light(photon.position, octahedral_unpack(photon.normal));
+    if light == NO_LIGHT {
+        return Impact();
+    }
+    return Impact(light, sent_on.x, sent_on.y, sent_on.z, photon.position - lights[light].position, 0u);
+}
+
+// Puts a photon in the place of the one that was in a slot of the pool.
+fn exchange(photon: Photon, slot: u32, hop: u32) {
+    let before = pool[slot];
+    let now = impact_of(photon, slot);
+    pool[slot] = now;
+    let is_same = all(vec4u(before.light, before.red, before.green, before.blue) == vec4u(now.light, now.red, now.green, now.blue));
+    let keeps_changes = params.keeps_changes == 1u && !is_same;
+    if impact_counts(before) {
+        atomicSub(&flux[before.light][0], before.red);
+        atomicSub(&flux[before.light][1], before.green);
+        atomicSub(&flux[before.light][2], before.blue);
+        atomicSub(&flux[before.light][3], 1u);
+        if keeps_changes {
+            note_change(before, hop > 0u);
+        }
+    }
+    if impact_counts(now) {
+        atomicAdd(&flux[now.light][0], now.red);
+        atomicAdd(&flux[now.light][1], now.green);
+        atomicAdd(&flux[now.light][2], now.blue);
+        atomicAdd(&flux[now.light][3], 1u);
+        if keeps_changes {
+            note_change(now, hop > 0u);
+        }
+    }
+}
+
+// One invocation an impact.
 @compute @workgroup_size(64)
 fn stream_impacts(@builtin(global_invocation_id) id: vec3u) {
     let index = id.y * params.row + id.x;
     if index >= params.path_count * params.hop_count {
         return;
     }
+    let hop = index / params.path_count;
     let path = (params.first_path + index % params.path_count) % params.pool_count;
-    let slot = (index / params.path_count) * params.pool_count + path;
-    let old = pool[slot];
-    if impact_counts(old) {
-        atomicSub(&flux[old.light][0], old.red);
-        atomicSub(&flux[old.light][1], old.green);
-        atomicSub(&flux[old.light][2], old.blue);
-        atomicSub(&flux[old.light][3], 1u);
-    }
-    let photon = photons[index];
-    let sent_on = flux_steps(exitant_flux(photon) * params.share, slot);
-    var light = NO_LIGHT;
-    if any(sent_on > vec3u(0u)) {
-        light = nearest_light(photon.position, octahedral_unpack(photon.normal));
-    }
-    if light == NO_LIGHT {
-        pool[slot] = Impact();
-        return;
-    }
-    pool[slot] = Impact(light, sent_on.x, sent_on.y, sent_on.z, photon.position - lights[light].position, 0u);
-    atomicAdd(&flux[light][0], sent_on.x);
-    atomicAdd(&flux[light][1], sent_on.y);
-    atomicAdd(&flux[light][2], sent_on.z);
-    atomicAdd(&flux[light][3], 1u);
+    exchange(photons[index], hop * params.pool_count + path, hop);
 }

@@ -1,0 +1,15 @@
+// Some paths of a pool that holds all there are: one invocation a path.
+
+@group(1) @binding(0) var<storage, read> listed: PathList;
+
+@compute @workgroup_size(64)
+fn stream_listed(@builtin(global_invocation_id) id: vec3u) {
+    let place = id.y * (listed.workgroups[0] * 64u) + id.x;
+    if place >= listed.count {
+        return;
+    }
+    for (var hop = 0u; hop < params.hop_count; hop++) {
+        let slot = hop * params.pool_count + listed.paths[place];
+        exchange(photons[slot], slot, hop);
+    }
+}

@@ -1,0 +1,30 @@
+// Rays from the chosen texels, as dense as the cosine: one invocation a ray.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<storage, read> lights: array<SurfaceLight>;
+@group(0) @binding(2) var<storage, read> chosen: PathList;
+@group(0) @binding(3) var<storage, read_write> rays: array<SurfaceRay>;
+
+// A ray that asks nothing: it starts where nothing is.
+const NOWHERE: vec3f = vec3f(0.0, 0.0, 64.0);
+
+@compute @workgroup_size(64)
+fn spread_rays(@builtin(global_invocation_id) id: vec3u) {
+    let index = id.y * params.row + id.x;
+    if id.x >= params.row || index >= params.budget * params.ray_count {
+        return;
+    }
+    let place = index / params.ray_count;
+    if place >= chosen.count {
+        rays[index] = SurfaceRay(NOWHERE, octahedral_pack(vec3f(0.0, 0.0, 1.0)), vec3f(0.0, 0.0, 1.0), 0u);
+        return;
+    }
+    let texel = chosen.paths[place];
+    let i = index % params.ray_count;
+    // Hammersley's points, shifted by numbers of the texel's own.
+    let shift = vec2f(hash_unit(texel, 0u), hash_unit(texel, 1u));
+    let u = fract(vec2f((f32(i) + 0.5) / f32(params.ray_count), halton(i, 0u)) + shift);
+    let normal = lights[texel].normal;
+    let direction = normalize(sampling_frame(normal) * sampling_cosine(min(u, vec2f(HALTON_BELOW_ONE))));
+    rays[index] = SurfaceRay(lights[texel].position, octahedral_pack(normal), direction, 0u);
+}

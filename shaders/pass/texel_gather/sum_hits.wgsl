@@ -1,0 +1,51 @@
+// What rays bring back: a workgroup a texel adds it up, in a fixed order.
+//   E = pi times the mean of L over rays as dense as the cosine, L = flux / (pi area) of the texel nearest to where a ray ends.
+
+@group(0) @binding(0) var<uniform> params: Params;
+@group(0) @binding(1) var<uniform> grid: SurfaceLightGrid;
+@group(0) @binding(2) var<storage, read> lights: array<SurfaceLight>;
+@group(0) @binding(3) var<storage, read> cells: array<u32>;
+@group(0) @binding(4) var<storage, read> flux: array<vec4u>;
+@group(0) @binding(5) var<storage, read> chosen: PathList;
+@group(0) @binding(6) var<storage, read> rays: array<SurfaceRay>;
+@group(0) @binding(7) var<storage, read> hits: array<SurfaceHit>;
+@group(0) @binding(8) var<storage, read_write> gathered: array<vec4f>;
+
+const LANES: u32 = 64u;
+
+var<workgroup> sums: array<vec3f, LANES>;
+
+// What a ray brings. What is lost brings nothing, nor do metal and glass, which hold no light.
+fn brought(index: u32) -> vec3f {
+    let hit = hits[index];
+    let is_hit = hit.kind == HIT_SURFACE || hit.kind == HIT_TENTATIVE;
+    if !is_hit || lobe_is_specular(hit.lobe) {
+        return vec3f(0.0);
+    }
+    let ray = rays[index];
+    let light = nearest_light(ray.position + hit.distance * ray.direction, octahedral_unpack(hit.normal));
+    if light == NO_LIGHT {
+        return vec3f(0.0);
+    }
+    return vec3f(flux[light].xyz) * (params.flux_of_step / lights[light].area);
+}
+
+@compute @workgroup_size(64)
+fn sum_hits(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
+    let first = params.ray_count * group.x;
+    var sum = vec3f(0.0);
+    for (var i = lane; i < params.ray_count; i += LANES) {
+        sum += brought(first + i);
+    }
+    sums[lane] = sum;
+    workgroupBarrier();
+    for (var half = LANES / 2u; half > 0u; half /= 2u) {
+        if lane < half {
+            sums[lane] += sums[lane + half];
+        }
+        workgroupBarrier();
+    }
+    if lane == 0u {
+        gathered[chosen.paths[group.x]] = vec4f(sums[0] / f32(params.ray_count), 1.0);
+    }
+}

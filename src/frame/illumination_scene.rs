@@ -1,0 +1,146 @@
+//! Indirect light that is kept at texels of surfaces: photons that stay until their way changes, all light at texels as these come and
+//! go, and the texels' irradiance, gathered again where it has changed.
+
+use super::Settings;
+use super::indirect_scene::PhotonPasses;
+use super::ray_tracers::{RayTracers, TracedScene};
+use super::selective_photons::Retraced;
+use super::traced_photons::{TracedPhotons, WalkInputs};
+use crate::Error;
+use crate::pass::{PhotonStreamInputs, PhotonStreamResources, TexelGatherInputs, TexelGatherResources};
+use crate::resource::{IlluminationMap, PhotonPool, SurfaceLights, SurfaceRays};
+use crate::scene::{SurfacePlace, UnitFrame};
+
+/// Allocated while indirect light comes from illumination maps.
+#[derive(Debug)]
+pub(super) struct IlluminationScene {
+    /// Where texels stand, and all light there.
+    lights: SurfaceLights,
+    /// Of all photons what each counts for.
+    pool: PhotonPool,
+    map: IlluminationMap,
+    rays: SurfaceRays,
+    stream: PhotonStreamResources,
+    gather: TexelGatherResources,
+    tracers: RayTracers,
+    frame: Option<UnitFrame>,
+}
+
+impl IlluminationScene {
+    pub(super) fn new(device: &wgpu::Device, settings: &Settings) -> Result<Self, Error> {
+        let own = &settings.illumination_maps;
+        let hops = settings.walked_bounces() + 1;
+        let lights = SurfaceLights::new(device, own.texels, hops)?;
+        let mut pool = PhotonPool::new(device, settings.traced_photons(), hops)?;
+        pool.note_changes();
+        Ok(Self {
+            map: IlluminationMap::new(device, &lights, own.gather.a_frame)?,
+            rays: SurfaceRays::new(device, own.gather.a_frame.saturating_mul(own.gather.rays))?,
+            stream: PhotonStreamResources::new(device)?,
+            gather: TexelGatherResources::new(device)?,
+            tracers: RayTracers::new(device)?,
+            frame: None,
+            lights,
+            pool,
+        })
+    }
+
+    /// Puts the texels where they are this frame. Returns whether all photons are to be traced, for the texels are other ones.
+    pub(super) fn follow(
+        &mut self,
+        (device, queue): (&wgpu::Device, &wgpu::Queue),
+        (frame, settings): (&UnitFrame, &Settings),
+        places: &[SurfacePlace],
+    ) -> Result<bool, Error> {
+        let before = self.lights.count();
+        if places.len() as u32 * 2 > self.lights.capacity() {
+            self.lights = SurfaceLights::new(device, places.len() as u32, self.pool.hops())?;
+            self.map = IlluminationMap::new(device, &self.lights, settings.illumination_maps.gather.a_frame)?;
+        }
+        self.lights.write(queue, frame, places)?;
+        let is_other = self.lights.count() != before || !self.frame.as_ref().is_some_and(|f| f.maps_like(frame));
+        if is_other {
+            self.pool.restart();
+            self.map.restart();
+        }
+        self.frame = Some(*frame);
+        Ok(is_other)
+    }
+
+    /// Records the photons of a frame, and the texels that these change.
+    pub(super) fn record(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        passes: &PhotonPasses,
+        traced: &mut TracedPhotons,
+        inputs: &WalkInputs<'_>,
+    ) -> Result<(), Error> {
+        let (Some(stream), Some(gather)) = (&passes.photon_stream, &passes.texel_gather) else {
+            return Ok(());
+        };
+        let (scene, settings) = (inputs.photons.scene, inputs.photons.settings);
+        let (lights, pool, own) = (&self.lights, &mut self.pool, &mut self.stream);
+        traced.record_selected(encoder, passes, inputs, &mut |encoder, photons, retraced| {
+            let mut stream_inputs = PhotonStreamInputs {
+                queue: scene.queue,
+                photons,
+                pool: &mut *pool,
+                lights,
+                timestamps: scene.timestamps,
+            };
+            match retraced {
+                Retraced::All => stream.record(encoder, own, &mut stream_inputs),
+                Retraced::Listed(list) => stream.record_listed(encoder, own, &stream_inputs, list),
+            }
+        })?;
+        let stream_inputs = PhotonStreamInputs {
+            queue: scene.queue,
+            photons: &traced.photons,
+            pool: &mut self.pool,
+            lights: &self.lights,
+            timestamps: scene.timestamps,
+        };
+        stream.record_places(encoder, &mut self.stream, &stream_inputs);
+        let mut gather_inputs = TexelGatherInputs {
+            queue: scene.queue,
+            lights: &self.lights,
+            share: self.pool.share(),
+            area: inputs.photons.area,
+            rays: &self.rays,
+            map: &mut self.map,
+            settings: &settings.illumination_maps.gather,
+            timestamps: scene.timestamps,
+        };
+        gather.record_rays(encoder, &mut self.gather, &mut gather_inputs)?;
+        let traced_scene = TracedScene {
+            queue: scene.queue,
+            passes,
+            settings,
+            #[cfg(feature = "bvh")]
+            bvh: scene.bvh,
+            maps: inputs.maps,
+            timestamps: scene.timestamps,
+        };
+        self.tracers.record(encoder, &self.rays, &traced_scene)?;
+        gather.record(encoder, &mut self.gather, &gather_inputs);
+        Ok(())
+    }
+
+    pub(super) fn lights(&self) -> &SurfaceLights {
+        &self.lights
+    }
+
+    pub(super) fn map(&self) -> &IlluminationMap {
+        &self.map
+    }
+
+    pub(super) fn memory_use(&self) -> u64 {
+        self.lights.memory_use()
+            + self.pool.memory_use()
+            + self.map.memory_use()
+            + self.rays.memory_use()
+            + self.stream.memory_use()
+            + self.gather.memory_use()
+            + self.tracers.memory_use()
+    }
+}
