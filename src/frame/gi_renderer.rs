@@ -28,8 +28,8 @@ use crate::pass::{
 use crate::resource::BvhGeometry;
 use crate::resource::{
     CameraView, CapturePurpose, CaptureView, DepthHierarchy, EnvMapIrradiance, EnvMaps, Environment, GBuffer, Geometry,
-    GuidingTables, IlluminationMap, Irradiance, MarkedPixels, PhotonGroups, PhotonPool, Photons, PrepareContext, Radiance, ShadowMaps,
-    Subsampling, SurfaceLights, Visibility,
+    GuidingTables, IlluminationMap, Irradiance, MarkedPixels, PhotonGroups, PhotonPool, Photons, PrepareContext,
+    Radiance, ShadowMaps, Subsampling, SurfaceLights, Visibility,
 };
 use crate::scene::{
     Camera, EnvironmentImage, Lamp, Light, LightKind, LightSources, Projection, SceneBounds, SceneSummary,
@@ -640,7 +640,9 @@ impl GiRenderer {
         #[cfg(feature = "bvh")]
         self.check_triangles(inputs)?;
         self.follow_places(inputs.queue)?;
-        let texels = self.illumination_map().map_or(0, |_| 2 * self.surface_places.len() as u32);
+        let texels = self
+            .illumination_map()
+            .map_or(0, |_| 2 * self.surface_places.len() as u32);
         let a_frame = self.settings.illumination_maps.gather.a_frame.max(1);
         self.submit_rounds(texels.div_ceil(a_frame), inputs)
     }

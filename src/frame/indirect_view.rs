@@ -6,10 +6,11 @@ use super::surface_light_view::SurfaceLightView;
 use super::{GlossyMethod, IndirectMethod, Settings, Upsampling, ViewInputs};
 use crate::Error;
 use crate::pass::{
-    FinalGather, FinalGatherInputs, FinalGatherResources, GlossyLight, IrradianceFilter, IrradianceFilterInputs, IrradianceFilterResources,
-    IrradianceFilterSettings, MarkedSplatInputs, PhotonGuidingInputs, PhotonGuidingResources, PhotonSplatter,
-    PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings, SpecularPaths, SplatShape,
-    SurfaceLightShading, TexelShading, TexelShadingInputs, TexelShadingResources, Upsampler, UpsamplerInputs, UpsamplerResources, progressive_scale,
+    FinalGather, FinalGatherInputs, FinalGatherResources, GlossyLight, IrradianceFilter, IrradianceFilterInputs,
+    IrradianceFilterResources, IrradianceFilterSettings, MarkedSplatInputs, PhotonGuidingInputs,
+    PhotonGuidingResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings,
+    SpecularPaths, SplatShape, SurfaceLightShading, TexelShading, TexelShadingInputs, TexelShadingResources, Upsampler,
+    UpsamplerInputs, UpsamplerResources, progressive_scale,
 };
 use crate::resource::{GBuffer, Irradiance, Lights, MarkedPixels, Photons, Subsampling, SurfaceRays};
 

@@ -2,9 +2,9 @@
 
 use super::Settings;
 use super::indirect_scene::PhotonPasses;
-use crate::pass::{ImageSpaceTracerRayInputs, ImageSpaceTracerResources};
 #[cfg(feature = "bvh")]
 use crate::pass::{BvhTracerResources, BvhTracerSurfaceRayInputs};
+use crate::pass::{ImageSpaceTracerRayInputs, ImageSpaceTracerResources};
 #[cfg(feature = "bvh")]
 use crate::resource::BvhGeometry;
 use crate::resource::{DepthHierarchy, EnvMaps, SurfaceRays};

@@ -5,8 +5,8 @@ use crate::pass::{
     Bandwidth, BoundaryCorrection, CoverageMeasure, EnvMapSelectorResources, EnvMapSelectorSettings, FirstHits,
     ImageSpaceTracerSettings, IndirectShadows, Kernel, LARGEST_RADIUS, LightForm, LightShape, MAX_POINTS, MAX_SELECTED,
     MAX_TAPS, MOST_FILTER_RADIUS, OccluderTest, PenumbraSearch, PhotonSplatterConfig, PhotonSplatterSettings,
-    SelectiveEmitterSettings, ShadowMethod, SoftShadowSettings, SplatShape, SurfaceLightShadingSettings, TexelGatherSettings, TraceMethod,
-    UpsamplerSettings,
+    SelectiveEmitterSettings, ShadowMethod, SoftShadowSettings, SplatShape, SurfaceLightShadingSettings,
+    TexelGatherSettings, TraceMethod, UpsamplerSettings,
 };
 use crate::resource::{Lights, MAX_LIGHTS, Subsampling};
 
@@ -922,10 +922,12 @@ const KNOBS: &[Knob] = &[
         illumination_maps.gather.a_frame,
         |v| (1..=32768).contains(&v)
     ),
-    field!("illumination_maps.rays", "1 to 4096", illumination_maps.gather.rays, |v| (
-        1..=4096
-    )
-        .contains(&v)),
+    field!(
+        "illumination_maps.rays",
+        "1 to 4096",
+        illumination_maps.gather.rays,
+        |v| (1..=4096).contains(&v)
+    ),
     field!(
         "illumination_maps.threshold",
         "0 or more: share of the light",

@@ -228,7 +228,7 @@ impl Cells {
             away.length_squared() + OFF_PLANE * away.dot(own.normal).powi(2) + apart
         };
         let middle = (own.position / self.side).floor().as_ivec3();
-        for rings in 1..=3 {
+        for rings in 1..=3i32 {
             let width = 2 * rings + 1;
             let around = (0..width.pow(3)).map(|i| IVec3::new(i % width, i / width % width, i / width.pow(2)) - rings);
             let near = around.filter_map(|cell| self.points.get(&(middle + cell))).flatten();
