@@ -359,6 +359,11 @@ impl BindGroupCache {
         }
     }
 
+    /// Room for uses.
+    pub(crate) fn uses(&self) -> usize {
+        self.capacity / CACHED_BIND_GROUPS
+    }
+
     /// The bind group of these resources, made now if it is not remembered.
     pub(crate) fn get(
         &mut self,

@@ -4,11 +4,11 @@
 use crate::gpu::Slot;
 use crate::pass::photon_splatter::{raster, tiled};
 use crate::pass::{
-    accumulator, composite, depth_hierarchy_build, direct_light, env_map_lighting, env_map_selector, final_gather,
-    fused_composite, glossy_light, image_space_tracer, irradiance_filter, nearest_occluder, photon_emitter,
-    photon_grid, photon_guiding, photon_splatter, photon_stream, photon_walk, selective_emitter, soft_shadow,
-    specular_paths, stable_sort, surface_light_shading, texel_gather, texel_shading, tone_map, trace_statistics,
-    upsampler,
+    accumulator, caustic_filter, composite, depth_hierarchy_build, direct_light, env_map_lighting, env_map_selector,
+    final_gather, fused_composite, glossy_light, image_space_tracer, irradiance_filter, nearest_occluder,
+    photon_emitter, photon_grid, photon_guiding, photon_splatter, photon_stream, photon_walk, selective_emitter,
+    soft_shadow, specular_paths, stable_sort, surface_light_shading, texel_gather, texel_shading, tone_map,
+    trace_statistics, upsampler,
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
@@ -371,8 +371,12 @@ fn twins() -> Vec<Twin> {
         }),
         twin!(wgsl::PHOTON_EMITTER, "EmissionTable", guiding_tables::gpu::EmissionTable { columns, rows }),
         twin!(wgsl::IMAGE_SPACE_TRACER, "ReflectionTable", guiding_tables::gpu::ReflectionTable { columns, rows }),
+        twin!(wgsl::CAUSTIC_FILTER, "Params", caustic_filter::gpu::Params {
+            first_slot, slot_count, row, steps, share, radius, least_pixels, most_pixels,
+        }),
+        twin!(wgsl::CAUSTIC_FILTER, "TileList", caustic_filter::gpu::TileList { workgroups, count, tiles }),
         twin!(wgsl::TEXEL_GATHER_SUM, "Params", texel_gather::gpu::Params {
-            texel_count, budget, ray_count, round, threshold, change_scale, flux_of_step, blend, row,
+            texel_count, budget, ray_count, round, threshold, change_scale, flux_of_step, blend, row, sample_offset,
         }),
         twin!(wgsl::TEXEL_SHADING, "Params", texel_shading::gpu::Params { factor, reach }),
         twin!(wgsl::SELECTIVE_EMITTER_PROBE, "Params", selective_emitter::gpu::Params {
@@ -531,6 +535,8 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "PhotonStream near" => vec![&photon_stream::NEAR_SLOTS],
         "PhotonStream places" => vec![&photon_stream::PLACE_SLOTS],
         "PhotonStream at impacts" => vec![&photon_stream::IMPACT_SLOTS],
+        "CausticFilter plot" => vec![&caustic_filter::PLOT_SLOTS],
+        "CausticFilter" => vec![&caustic_filter::FILTER_SLOTS],
         "SelectiveEmitter probe" => vec![&selective_emitter::PROBE_SLOTS],
         "SelectiveEmitter keep" => vec![&selective_emitter::KEEP_SLOTS],
         "SelectiveEmitter compare" => vec![&selective_emitter::COMPARE_SLOTS],

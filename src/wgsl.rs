@@ -658,6 +658,23 @@ pub(crate) const TEXEL_SHADING: &str = compose![
     "common/octahedral.wgsl",
 ];
 
+pub(crate) const CAUSTIC_FILTER_PLOT: &str = compose![
+    "pass/caustic_filter/plot_photons.wgsl",
+    "pass/caustic_filter/params.wgsl",
+    "common/bilateral.wgsl",
+    "common/g_buffer.wgsl",
+    "common/photon.wgsl",
+    "common/octahedral.wgsl",
+];
+
+pub(crate) const CAUSTIC_FILTER: &str = compose![
+    "pass/caustic_filter/filter_tiles.wgsl",
+    "pass/caustic_filter/params.wgsl",
+    "common/bilateral.wgsl",
+    "common/g_buffer.wgsl",
+    "common/octahedral.wgsl",
+];
+
 pub(crate) const IRRADIANCE_FILTER: &str = compose![
     "pass/irradiance_filter.wgsl",
     "common/bilateral.wgsl",
@@ -1132,6 +1149,8 @@ pub const MODULES: &[(&str, &str)] = &[
     ("TexelGather sum", TEXEL_GATHER_SUM),
     ("TexelGather blend", TEXEL_GATHER_BLEND),
     ("TexelShading", TEXEL_SHADING),
+    ("CausticFilter plot", CAUSTIC_FILTER_PLOT),
+    ("CausticFilter", CAUSTIC_FILTER),
     ("IrradianceFilter", IRRADIANCE_FILTER),
     ("Upsampler", UPSAMPLER),
     ("DirectLight", DIRECT_LIGHT),

@@ -148,7 +148,7 @@ impl<'a> Offline<'a> {
             sample_offset,
             timestamps,
         };
-        if self.renderer.photon_pool().is_some_and(|pool| pool.share() < 1.0) {
+        if self.renderer.photon_pool().is_some_and(|pool| pool.is_filling()) {
             self.renderer.fill_photon_pool(&scene_inputs)?;
         }
         if self.is_first {

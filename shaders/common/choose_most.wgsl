@@ -63,7 +63,7 @@ fn choose_most(lane: u32) -> Choice {
     var waiting = 0u;
     for (var first = 0u; first < count; first += CHOICE_LANES) {
         let place = first + lane;
-        let i = (place + candidate_turn()) % count;
+        let i = (place + candidate_turn() % count) % count;
         var size = 0u;
         var power = -1;
         let priority = candidate_priority(i);

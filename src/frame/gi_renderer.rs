@@ -346,6 +346,9 @@ impl GiRenderer {
             if settings.indirect_method == IndirectMethod::Splatting {
                 PhotonSplatterResources::check(device, config, settings.photons, settings.bounces)?;
             }
+            if settings.keeps_near() {
+                PhotonSplatterResources::check(device, config, settings.pool_paths(), 1)?;
+            }
             if plan.is_on(Stage::CausticMap) {
                 PhotonSplatterResources::check(device, config, settings.caustic.photons, settings.bounces)?;
             }
@@ -388,6 +391,9 @@ impl GiRenderer {
         }
         if let Some(lights) = self.indirect.as_mut().and_then(IndirectScene::surface_lights_mut) {
             lights.wake();
+        }
+        if let (Some(indirect), super::TracerKind::ImageSpace) = (&mut self.indirect, self.settings.tracer_kind) {
+            indirect.retrace();
         }
         self.apply_centers(queue)
     }
@@ -631,18 +637,23 @@ impl GiRenderer {
         self.submit_rounds(rounds, inputs)
     }
 
-    /// Gathers all texels of the illumination map at once instead of over many frames: at the start, after a cut. Submits what it
-    /// records and does not wait; call it after `prepare`, before `record_scene`. Nothing where there is no such map.
+    /// Forgets the illumination map, traces all photons and gathers all texels at once instead of over many frames: at the start, after a
+    /// cut. Submits what it records and does not wait; call it after `prepare`, before `record_scene`. Nothing where there is no
+    /// such map.
     ///
     /// # Errors
     /// As [`GiRenderer::record_scene`].
     pub fn fill_illumination_map(&mut self, inputs: &SceneInputs<'_>) -> Result<(), Error> {
+        if self.illumination_map().is_none() {
+            return Ok(());
+        }
         #[cfg(feature = "bvh")]
         self.check_triangles(inputs)?;
         self.follow_places(inputs.queue)?;
-        let texels = self
-            .illumination_map()
-            .map_or(0, |_| 2 * self.surface_places.len() as u32);
+        if let Some(indirect) = &mut self.indirect {
+            indirect.restart_illumination();
+        }
+        let texels = 2 * self.surface_places.len() as u32;
         let a_frame = self.settings.illumination_maps.gather.a_frame.max(1);
         self.submit_rounds(texels.div_ceil(a_frame), inputs)
     }
@@ -868,7 +879,7 @@ impl GiRenderer {
             };
             own.record(encoder, &indirect_inputs)?;
             if let Some(caustic) = &mut resources.caustic {
-                caustic.record(encoder, &indirect_inputs);
+                caustic.record(encoder, &indirect_inputs)?;
             }
             if let Some(specular) = &mut resources.specular {
                 specular.record(encoder, &indirect_inputs, &direct.shadow_maps, &self.environment)?;
@@ -1027,9 +1038,14 @@ impl GiRenderer {
         self.direct.as_ref().map(|d| &d.shadow_maps)
     }
 
-    /// Surface lights, while indirect light comes from them.
+    /// Surface lights, while indirect light comes from them; or all light at the texels of an illumination map.
     pub fn surface_lights(&self) -> Option<&SurfaceLights> {
-        self.indirect.as_ref()?.surface_lights().map(SurfaceLightScene::lights)
+        let indirect = self.indirect.as_ref()?;
+        let of_texels = || indirect.illumination().map(|i| i.lights());
+        indirect
+            .surface_lights()
+            .map(SurfaceLightScene::lights)
+            .or_else(of_texels)
     }
 
     /// The photons that they are made of, unless they stand at impacts.

@@ -29,9 +29,8 @@ pub(super) struct IlluminationScene {
 impl IlluminationScene {
     pub(super) fn new(device: &wgpu::Device, settings: &Settings) -> Result<Self, Error> {
         let own = &settings.illumination_maps;
-        let hops = settings.walked_bounces() + 1;
-        let lights = SurfaceLights::new(device, own.texels, hops)?;
-        let mut pool = PhotonPool::new(device, settings.traced_photons(), hops)?;
+        let lights = SurfaceLights::new(device, own.texels, settings.bounces)?;
+        let mut pool = PhotonPool::new(device, settings.traced_photons(), settings.bounces + 1)?;
         pool.note_changes();
         Ok(Self {
             map: IlluminationMap::new(device, &lights, own.gather.a_frame)?,
@@ -54,17 +53,22 @@ impl IlluminationScene {
     ) -> Result<bool, Error> {
         let before = self.lights.count();
         if places.len() as u32 * 2 > self.lights.capacity() {
-            self.lights = SurfaceLights::new(device, places.len() as u32, self.pool.hops())?;
+            self.lights = SurfaceLights::new(device, places.len() as u32, settings.bounces)?;
             self.map = IlluminationMap::new(device, &self.lights, settings.illumination_maps.gather.a_frame)?;
         }
         self.lights.write(queue, frame, places)?;
         let is_other = self.lights.count() != before || !self.frame.as_ref().is_some_and(|f| f.maps_like(frame));
         if is_other {
-            self.pool.restart();
-            self.map.restart();
+            self.restart();
         }
         self.frame = Some(*frame);
         Ok(is_other)
+    }
+
+    /// Forgets all light: all photons are to be traced.
+    pub(super) fn restart(&mut self) {
+        self.pool.restart();
+        self.map.restart();
     }
 
     /// Records the photons of a frame, and the texels that these change.
@@ -79,6 +83,11 @@ impl IlluminationScene {
             return Ok(());
         };
         let (scene, settings) = (inputs.photons.scene, inputs.photons.settings);
+        #[cfg(feature = "bvh")]
+        if scene.bvh.is_none() && settings.tracer_kind.uses_triangles() {
+            // A frame of photons for the selection of places alone.
+            return traced.record_all(encoder, passes, inputs);
+        }
         let (lights, pool, own) = (&self.lights, &mut self.pool, &mut self.stream);
         traced.record_selected(encoder, passes, inputs, &mut |encoder, photons, retraced| {
             let mut stream_inputs = PhotonStreamInputs {
@@ -108,6 +117,7 @@ impl IlluminationScene {
             area: inputs.photons.area,
             rays: &self.rays,
             map: &mut self.map,
+            sample_offset: inputs.sample_offset,
             settings: &settings.illumination_maps.gather,
             timestamps: scene.timestamps,
         };

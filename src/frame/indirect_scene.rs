@@ -219,7 +219,10 @@ impl IndirectScene {
         }
         let is_split = self.caustics.is_some();
         let map = if is_split { PhotonMap::Global } else { PhotonMap::All };
-        self.global.photons.set_map(map);
+        if self.global.photons.map() != map {
+            self.global.photons.set_map(map);
+            self.global.retrace();
+        }
         Ok(())
     }
 
@@ -259,6 +262,14 @@ impl IndirectScene {
     /// Has all photons traced as a whole in the next frame, even if they stay until their way changes.
     pub(super) fn retrace(&mut self) {
         self.global.retrace();
+    }
+
+    /// Has all light at texels forgotten and gathered anew.
+    pub(super) fn restart_illumination(&mut self) {
+        if let Some(illumination) = &mut self.illumination {
+            illumination.restart();
+            self.global.retrace();
+        }
     }
 
     /// In groups, if photons stay until their way changes.

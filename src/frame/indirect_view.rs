@@ -3,14 +3,14 @@
 use super::indirect_scene::{IndirectScene, PhotonPasses};
 use super::ray_tracers::{RayTracers, TracedScene};
 use super::surface_light_view::SurfaceLightView;
-use super::{GlossyMethod, IndirectMethod, Settings, Upsampling, ViewInputs};
+use super::{CausticMethod, GlossyMethod, IndirectMethod, Settings, Upsampling, ViewInputs};
 use crate::Error;
 use crate::pass::{
-    FinalGather, FinalGatherInputs, FinalGatherResources, GlossyLight, IrradianceFilter, IrradianceFilterInputs,
-    IrradianceFilterResources, IrradianceFilterSettings, MarkedSplatInputs, PhotonGuidingInputs,
-    PhotonGuidingResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources, PhotonSplatterSettings,
-    SpecularPaths, SplatShape, SurfaceLightShading, TexelShading, TexelShadingInputs, TexelShadingResources, Upsampler,
-    UpsamplerInputs, UpsamplerResources, progressive_scale,
+    CausticFilter, FinalGather, FinalGatherInputs, FinalGatherResources, GlossyLight, IrradianceFilter,
+    IrradianceFilterInputs, IrradianceFilterResources, IrradianceFilterSettings, MarkedSplatInputs,
+    PhotonGuidingInputs, PhotonGuidingResources, PhotonSplatter, PhotonSplatterInputs, PhotonSplatterResources,
+    PhotonSplatterSettings, SpecularPaths, SplatShape, SurfaceLightShading, TexelShading, TexelShadingInputs,
+    TexelShadingResources, Upsampler, UpsamplerInputs, UpsamplerResources, progressive_scale,
 };
 use crate::resource::{GBuffer, Irradiance, Lights, MarkedPixels, Photons, Subsampling, SurfaceRays};
 
@@ -29,6 +29,8 @@ pub(super) struct ViewPasses {
     pub(super) surface_light_shading: Option<SurfaceLightShading>,
     /// If they take illumination maps.
     texel_shading: Option<TexelShading>,
+    /// If caustics are filtered.
+    pub(super) caustic_filter: Option<CausticFilter>,
     upsampler: Upsampler,
     pub(super) specular_paths: SpecularPaths,
     /// If the settings light rough metal by photons.
@@ -124,6 +126,7 @@ impl ViewPasses {
                 .then(|| SurfaceLightShading::new(device)),
             texel_shading: (settings.indirect_method == IndirectMethod::IlluminationMaps)
                 .then(|| TexelShading::new(device)),
+            caustic_filter: (settings.caustic.method == CausticMethod::Filter).then(|| CausticFilter::new(device)),
             upsampler: Upsampler::new(device),
             specular_paths: SpecularPaths::new(
                 device,

@@ -29,6 +29,6 @@ pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};
 pub use photon_feeder::PhotonFeeder;
 pub use plan::{Plan, PlannedStage, Stage};
 pub use settings::{
-    CausticSettings, FinalGatherSettings, GlossyMethod, IlluminationMapSettings, IndirectMethod, LightPlacement,
-    SelectiveSettings, Settings, SurfaceLightSettings, TracerKind, Upsampling,
+    CausticMethod, CausticSettings, FinalGatherSettings, GlossyMethod, IlluminationMapSettings, IndirectMethod,
+    LightPlacement, SelectiveSettings, Settings, SurfaceLightSettings, TracerKind, Upsampling,
 };

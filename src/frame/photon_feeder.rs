@@ -7,13 +7,13 @@
 
 use crate::halton::radical_inverse;
 use crate::resource::bvh_tree::binary_tree;
-use crate::resource::{Photon, Photons};
+use crate::resource::{Photon, PhotonMap, Photons};
 use crate::scene::{EmissiveTriangle, Light, LightKind, Scene, Sun, UnitFrame, one_minus_cos};
 use glam::{DVec3, Mat3, Vec2, Vec3, Vec3A};
 use obvhs::bvh2::Bvh2;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::triangle::Triangle;
-use std::f32::consts::TAU;
+use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender, SyncSender, TrySendError};
@@ -107,9 +107,12 @@ impl PhotonFeeder {
         let fits = photons.count() == self.paths && photons.bounces() == self.bounces;
         let newest = self.newest.load(Ordering::Relaxed);
         let batches = self.batches.iter().filter(|_| fits).flat_map(Receiver::try_iter);
-        let Some((_, batch)) = batches.into_iter().find(|(number, _)| *number == newest) else {
+        let Some((_, mut batch)) = batches.into_iter().find(|(number, _)| *number == newest) else {
             return false;
         };
+        if photons.map() != PhotonMap::Global {
+            batch.iter_mut().for_each(|p| p.state &= !Photon::CAUSTIC);
+        }
         queue.write_buffer(photons.buffer(), 0, bytemuck::cast_slice(&batch));
         true
     }
@@ -310,15 +313,25 @@ impl World {
         let share = self.until[source] - if source == 0 { 0.0 } else { self.until[source - 1] };
         let mut flux = *flux / (share * paths as f64) as f32;
         let (mut origin, mut direction) = kind.start(&mut random, self.radius);
+        // By way of metal and glass alone so far; and since the last diffuse surface, how it was left and how far ago.
+        let mut is_caustic = false;
+        let (mut leaving, mut way) = (None, 0.0);
         for (hop, photon) in photons.iter_mut().enumerate() {
             let Some(hit) = self.hit(origin, direction) else { break };
             // Not diffuse, in one way or another.
             let lobe = u32::from(hit.is_metal || hit.is_glass) << 2;
+            way += hit.position.distance(origin);
+            let arriving = hit.normal.dot(direction).abs();
+            let density = leaving.map_or(0.0, |cosine: f32| {
+                cosine * arriving / (PI * way * way).max(f32::MIN_POSITIVE)
+            });
+            let caustic = if is_caustic { Photon::CAUSTIC } else { 0 };
+            is_caustic = lobe != 0 && (hop == 0 || is_caustic);
             *photon = Photon {
                 position: hit.position.to_array(),
-                state: 1 | lobe | if hop == 0 { Photon::FIRST_HIT } else { 0 },
+                state: 1 | lobe | caustic | if hop == 0 { Photon::FIRST_HIT } else { 0 },
                 flux: flux.to_array(),
-                density: 0.0,
+                density,
                 normal: Photon::pack_unit_vector(hit.normal),
                 direction: Photon::pack_unit_vector(direction),
                 reflectance: Photon::pack_reflectance(hit.reflectance.to_array()),
@@ -334,6 +347,9 @@ impl World {
                 true => direction - 2.0 * direction.dot(hit.normal) * hit.normal,
                 false => about(hit.normal) * cosine(random.pair()),
             };
+            if !hit.is_metal {
+                (leaving, way) = (Some(hit.normal.dot(direction)), 0.0);
+            }
             origin = hit.position + OFF_SURFACE * hit.normal;
         }
         photons

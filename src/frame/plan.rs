@@ -448,13 +448,15 @@ fn simplifications(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
             list(&specular)
         ));
     }
-    if settings.indirect_method == IndirectMethod::IlluminationMaps && !specular.is_empty() {
-        notes.push(format!("seen in {}: light with one bounce less", list(&specular)));
-    }
     if settings.indirect_method == IndirectMethod::SurfaceLights && !specular.is_empty() {
         notes.push(format!(
-            "seen in {}: light of this frame's photons, with one bounce less",
-            list(&specular)
+            "seen in {}: light of this frame's photons{}",
+            list(&specular),
+            if settings.keeps_near() {
+                ""
+            } else {
+                ", with one bounce less"
+            }
         ));
     }
     if settings.indirect_method == IndirectMethod::FinalGather && !specular.is_empty() {

@@ -2,11 +2,11 @@
 
 use crate::Error;
 use crate::pass::{
-    Bandwidth, BoundaryCorrection, CoverageMeasure, EnvMapSelectorResources, EnvMapSelectorSettings, FirstHits,
-    ImageSpaceTracerSettings, IndirectShadows, Kernel, LARGEST_RADIUS, LightForm, LightShape, MAX_POINTS, MAX_SELECTED,
-    MAX_TAPS, MOST_FILTER_RADIUS, OccluderTest, PenumbraSearch, PhotonSplatterConfig, PhotonSplatterSettings,
-    SelectiveEmitterSettings, ShadowMethod, SoftShadowSettings, SplatShape, SurfaceLightShadingSettings,
-    TexelGatherSettings, TraceMethod, UpsamplerSettings,
+    Bandwidth, BoundaryCorrection, CausticFilterSettings, CoverageMeasure, EnvMapSelectorResources,
+    EnvMapSelectorSettings, FirstHits, ImageSpaceTracerSettings, IndirectShadows, Kernel, LARGEST_RADIUS, LightForm,
+    LightShape, MAX_POINTS, MAX_SELECTED, MAX_TAPS, MOST_FILTER_RADIUS, OccluderTest, PenumbraSearch,
+    PhotonSplatterConfig, PhotonSplatterSettings, SelectiveEmitterSettings, ShadowMethod, SoftShadowSettings,
+    SplatShape, SurfaceLightShadingSettings, TexelGatherSettings, TraceMethod, UpsamplerSettings,
 };
 use crate::resource::{Lights, MAX_LIGHTS, Subsampling};
 
@@ -53,14 +53,13 @@ pub enum IndirectMethod {
     /// By rays from there, which bring back the light of lit environment maps. No kernel lies over an edge; noise is that of few
     /// rays. It takes environment maps, whatever the tracer; rays meet what photons do. Light has one bounce more.
     FinalGather,
-    /// From virtual surface lights: points on surfaces that stand for the light of a pool of photons around them. No kernel and no
-    /// noise of photons; their number is that of lights. It takes places,
+    /// From virtual surface lights: points on surfaces that stand for the light of a pool of photons around them. Their number is that of
+    /// lights, and kernels are those of the few photons near by. It takes places,
     /// [`GiRenderer::set_surface_places`](super::GiRenderer::set_surface_places), or stands them where photons arrive.
     SurfaceLights,
     /// From irradiance kept at texels of surfaces, which is gathered again only where photons say that it has changed; photons stay until
-    /// their way changes ([`Settings::selective`], whatever it says). Cheapest while little moves; light follows within some
-    /// frames. It takes places for texels, [`GiRenderer::set_surface_places`](super::GiRenderer::set_surface_places). Light has one
-    /// bounce less in mirrors and glass.
+    /// their way changes ([`Settings::selective`], whatever it says, unless they are guided). Cheapest while little moves; light follows within some
+    /// frames. It takes places for texels, [`GiRenderer::set_surface_places`](super::GiRenderer::set_surface_places).
     IlluminationMaps,
 }
 
@@ -99,7 +98,8 @@ pub struct SurfaceLightSettings {
     /// Whether photons that came a short way are splatted beside them, for what discs ([`LightShape::Disc`]) lose near by, and all that
     /// came by way of metal and glass. Other shapes, and lights at impacts, have none.
     pub near_photons: bool,
-    /// Photons under a kernel of these, above 0: among as many as the pool has paths. Fewer keep corners sharper and are noisier.
+    /// Photons under a kernel of these, above 0: among as many as the pool has paths, and all else as the splatter's settings say. Fewer
+    /// keep corners sharper and are noisier.
     pub near_kernel: f32,
     /// Estimated pixels to each side that the noise of [`IndirectShadows::Some`] is evened out over, 0 to 16.
     pub filter_radius: u32,
@@ -193,6 +193,16 @@ impl Default for FinalGatherSettings {
     }
 }
 
+/// How caustic photons come to pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum CausticMethod {
+    /// Under kernels as wide as they lie apart on the screen.
+    #[default]
+    Splatting,
+    /// As points that a filter of the screen evens out: faster where they are many, and as wide everywhere.
+    Filter,
+}
+
 /// Photons of caustics alone: of light that comes to a diffuse surface by way of metal and glass and nothing else. They are
 /// aimed at what [`SceneSummary::specular_bounds`](crate::scene::SceneSummary::specular_bounds) holds, drawn at every pixel,
 /// and are as wide as they lie apart on the screen.
@@ -202,6 +212,10 @@ pub struct CausticSettings {
     pub photons: u32,
     /// Photons under a kernel, above 0. Fewer are sharper and noisier.
     pub kernel_photons: f32,
+    /// How they come to pixels.
+    pub method: CausticMethod,
+    /// Of the filter.
+    pub filter: CausticFilterSettings,
     /// Narrowest kernel, its radius in pixels, 0 or more: narrower ones fall between pixels, and are noise.
     pub min_radius: f32,
 }
@@ -211,6 +225,8 @@ impl Default for CausticSettings {
         Self {
             photons: 100_000,
             kernel_photons: 40.0,
+            method: CausticMethod::default(),
+            filter: CausticFilterSettings::default(),
             min_radius: 0.75,
         }
     }
@@ -515,7 +531,6 @@ impl Settings {
     pub fn walked_bounces(&self) -> u32 {
         match self.indirect_method {
             IndirectMethod::SurfaceLights if !self.keeps_near() => self.bounces.saturating_sub(1),
-            IndirectMethod::IlluminationMaps => self.bounces.saturating_sub(1),
             _ => self.bounces,
         }
     }
@@ -856,7 +871,7 @@ const KNOBS: &[Knob] = &[
     field!("tracer.roulette_from", "1 or more", tracer.roulette_from, |v| v >= 1),
     choice!(
         "indirect.method",
-        "splatting, final-gather or surface-lights",
+        "splatting, final-gather, surface-lights or illumination-maps",
         indirect_method,
         ["splatting", IndirectMethod::Splatting],
         ["final-gather", IndirectMethod::FinalGather],
@@ -869,6 +884,19 @@ const KNOBS: &[Knob] = &[
         "caustic.kernel_photons",
         "above 0: photons under a kernel",
         caustic.kernel_photons,
+        |v: f32| v > 0.0 && v.is_finite()
+    ),
+    choice!(
+        "caustic.method",
+        "splatting or filter",
+        caustic.method,
+        ["splatting", CausticMethod::Splatting],
+        ["filter", CausticMethod::Filter]
+    ),
+    field!(
+        "caustic.filter_radius",
+        "above 0: share of the region's radius",
+        caustic.filter.radius,
         |v: f32| v > 0.0 && v.is_finite()
     ),
     field!("caustic.min_radius", "0 to 23 pixels", caustic.min_radius, |v: f32| {

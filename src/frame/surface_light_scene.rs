@@ -158,7 +158,9 @@ impl SurfaceLightScene {
 
     /// What lights lose near by, if it is kept.
     pub(super) fn near_photons(&self) -> Option<&Photons> {
-        self.pool.as_ref().and_then(PhotonPool::near)
+        // Those of another unit frame lie elsewhere.
+        let pool = self.pool.as_ref().filter(|pool| !pool.is_stale());
+        pool.and_then(PhotonPool::near)
     }
 
     pub(super) fn memory_use(&self) -> u64 {

@@ -29,6 +29,8 @@ pub(super) struct SurfaceLightView {
 struct NearPhotons {
     splatter: PhotonSplatterResources,
     irradiance: Irradiance,
+    /// Whether there were any in the last frame.
+    are_there: bool,
 }
 
 #[derive(Debug)]
@@ -61,7 +63,7 @@ impl SurfaceLightView {
         }
     }
 
-    /// Makes or drops what shadows need, room for the rays of a band of `size` pixels' rows, and what photons near by do.
+    /// Makes or drops what shadows need, room for the rays of a band of `size` pixels' rows; makes what photons near by need.
     pub(super) fn follow(
         &mut self,
         device: &wgpu::Device,
@@ -73,6 +75,7 @@ impl SurfaceLightView {
             self.near = Some(NearPhotons {
                 splatter: PhotonSplatterResources::new(device, &settings.splatter_config, photons, size)?,
                 irradiance: Irradiance::new(device, size, wgpu::TextureFormat::Rgba32Float)?,
+                are_there: false,
             });
         }
         let rays = SurfaceLightShading::rays_a_pixel(&settings.surface_lights.shading, scene.lights());
@@ -107,8 +110,11 @@ impl SurfaceLightView {
             settings: &inputs.settings.surface_lights.shading,
             timestamps: inputs.view.timestamps,
         };
-        if let (Some(near), Some(photons)) = (&mut self.near, scene.near_photons()) {
-            near.record(encoder, photons, inputs);
+        if let Some(near) = &mut self.near {
+            near.are_there = scene.near_photons().is_some();
+            if let Some(photons) = scene.near_photons() {
+                near.record(encoder, photons, inputs);
+            }
         }
         let Some(shadows) = &mut self.shadows else {
             return pass.record(encoder, &mut self.own, &shading_inputs);
@@ -127,7 +133,7 @@ impl SurfaceLightView {
 
     /// What is to be added to the irradiance that was recorded.
     pub(super) fn near(&self) -> Option<&Irradiance> {
-        self.near.as_ref().map(|n| &n.irradiance)
+        self.near.as_ref().filter(|n| n.are_there).map(|n| &n.irradiance)
     }
 
     pub(super) fn memory_use(&self) -> u64 {

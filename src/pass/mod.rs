@@ -8,6 +8,7 @@ pub(crate) mod accumulator;
 #[cfg(feature = "bvh")]
 pub(crate) mod bvh_tracer;
 mod capture;
+pub(crate) mod caustic_filter;
 pub(crate) mod composite;
 pub(crate) mod depth_hierarchy_build;
 pub(crate) mod direct_light;
@@ -45,6 +46,7 @@ pub use accumulator::{Accumulator, AccumulatorInputs, AccumulatorResources};
 pub use bvh_tracer::{
     BvhTracer, BvhTracerInputs, BvhTracerRayInputs, BvhTracerResources, BvhTracerSurfaceRayInputs, RayQuery,
 };
+pub use caustic_filter::{CausticFilter, CausticFilterInputs, CausticFilterResources, CausticFilterSettings};
 pub use composite::{Composite, CompositeInputs, CompositeResources, CompositeSettings};
 pub use depth_hierarchy_build::{DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources};
 pub use direct_light::{DirectLight, DirectLightInputs, DirectLightResources};

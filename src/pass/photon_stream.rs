@@ -222,7 +222,7 @@ impl PhotonStream {
         if paths == 0 || inputs.lights.count() == 0 {
             return Ok(());
         }
-        let (groups, row) = dispatch_64(paths * hops);
+        let (groups, row) = dispatch_64(paths * inputs.pool.hops());
         let group = self.stream_group(resources, inputs, [hops, first_path, row]);
         let label = "lightfall::PhotonStream";
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
@@ -236,7 +236,7 @@ impl PhotonStream {
     }
 
     /// Records that some of the paths have become other ones, where the pool holds all photons that there are: nothing else of it
-    /// changes. Follow it with [`PhotonStream::record_places`].
+    /// changes, nor do photons near by, if it keeps them. Follow it with [`PhotonStream::record_places`].
     ///
     /// # Errors
     /// [`Error::CountMismatch`] for another number of paths than the pool holds, or of hops; nothing is recorded then.
@@ -420,12 +420,14 @@ impl PhotonStream {
     }
 }
 
-/// Paths and hops whose light goes on.
+/// Paths, and hops whose light goes on.
 fn checked_paths(inputs: &PhotonStreamInputs<'_>, is_other_number: bool) -> Result<(u32, u32), Error> {
     let (photons, pool) = (inputs.photons, &*inputs.pool);
     let paths = photons.count();
-    // What arrives last is of use near by alone.
-    let hops = photons.bounces() + u32::from(pool.near().is_none());
+    // What arrives last is of use near by, or for what it changes, alone.
+    let ends = pool.near().is_some() || pool.notes_changes();
+    let hops = photons.bounces() + u32::from(!ends);
+    let kept = hops + u32::from(pool.notes_changes());
     for (what, expected, found, is_bad) in [
         (
             "photons to stream (what the pool holds)",
@@ -436,8 +438,8 @@ fn checked_paths(inputs: &PhotonStreamInputs<'_>, is_other_number: bool) -> Resu
         (
             "hops of photons to stream (as many as the pool has; one more where it keeps those near by)",
             pool.hops(),
-            hops,
-            hops != pool.hops(),
+            kept,
+            kept != pool.hops(),
         ),
     ] {
         if is_bad {

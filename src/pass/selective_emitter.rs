@@ -9,11 +9,13 @@
 //! Order, for each frame: [`SelectiveEmitter::record_probes`]; emission and walk of [`PhotonGroups::probes`] (the `record_listed` of
 //! [`PhotonEmitter`](super::PhotonEmitter) and of a tracer); whatever exchanges the old paths for the new ones elsewhere;
 //! [`SelectiveEmitter::record_choice`]; the same of [`PhotonGroups::chosen`]. Cost: a path for each group, and what has changed. A
-//! change that only some of a group's paths meet is found after as many frames as the group has paths, at the latest.
+//! change that only some of a group's paths meet is found after as many frames as the group has paths, times the interval, at the latest;
+//! where more changes than the budget allows, what waits gains on what changes again. Limits: lights that take another number of photons, as
+//! when one grows brighter, have all photons traced anew.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::photon_groups::LightsChange;
-use crate::resource::{Lights, PathList, PhotonGroups, Photons};
+use crate::resource::{Lights, PhotonGroups, Photons};
 use crate::{Error, Timestamps, wgsl};
 
 pub(crate) mod gpu {
@@ -192,7 +194,9 @@ impl SelectiveEmitter {
             encoder.clear_buffer(inputs.groups.counts(), 0, None);
             return false;
         };
-        if is_new || inputs.groups.count() == 0 || inputs.photons.count() != inputs.groups.paths() {
+        let fits = inputs.photons.count() == inputs.groups.paths();
+        if is_new || inputs.groups.count() == 0 || !fits {
+            resources.is_new = !fits;
             encoder.clear_buffer(inputs.groups.changed(), 0, None);
             encoder.clear_buffer(inputs.groups.counts(), 0, None);
             return false;
@@ -235,11 +239,11 @@ impl SelectiveEmitter {
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(workgroups[0], workgroups[1], 1);
         drop(pass);
-        self.record_kept(encoder, resources, inputs, groups.probes());
+        self.record_kept(encoder, resources, inputs);
         true
     }
 
-    /// Records, after probes were traced anew, which groups have changed and which of them are traced anew, and what they were.
+    /// Records, after probes were traced anew, which groups have changed and which of them are traced anew.
     pub fn record_choice(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -273,8 +277,6 @@ impl SelectiveEmitter {
         pass.set_pipeline(&self.choose.pipeline);
         pass.set_bind_group(0, &choose, &[]);
         pass.dispatch_workgroups(1, 1, 1);
-        drop(pass);
-        self.record_kept(encoder, resources, inputs, groups.chosen());
     }
 
     fn record_kept(
@@ -282,8 +284,8 @@ impl SelectiveEmitter {
         encoder: &mut wgpu::CommandEncoder,
         resources: &mut SelectiveEmitterResources,
         inputs: &SelectiveEmitterInputs<'_>,
-        list: &PathList,
     ) {
+        let list = inputs.groups.probes();
         let bound = [
             (&resources.params).into(),
             inputs.photons.buffer().into(),
@@ -307,8 +309,7 @@ impl SelectiveEmitterResources {
     pub fn new(device: &wgpu::Device) -> Result<Self, Error> {
         Ok(Self {
             params: device::uniform_buffer::<gpu::Params>(device, "lightfall::SelectiveEmitter::params")?,
-            // What is kept, of either list.
-            groups: [1, 1, 1, 2].map(BindGroupCache::for_uses),
+            groups: Default::default(),
             frame: 0,
             is_new: true,
         })

@@ -31,6 +31,7 @@ pub(crate) mod gpu {
         pub(crate) flux_of_step: f32,
         pub(crate) blend: f32,
         pub(crate) row: u32,
+        pub(crate) sample_offset: u32,
     }
 }
 
@@ -38,12 +39,13 @@ pub(crate) mod gpu {
 pub(crate) const CHANGE_SLOTS: [Slot; 4] = [Slot::Uniform, Slot::Storage, Slot::Storage, Slot::StorageMut];
 
 /// Bindings of `shaders/pass/texel_gather/mark_due.wgsl`, in order.
-pub(crate) const DUE_SLOTS: [Slot; 6] = [
+pub(crate) const DUE_SLOTS: [Slot; 7] = [
     Slot::Uniform,
     Slot::Storage,
     Slot::Storage,
     Slot::Storage,
     Slot::StorageMut,
+    Slot::Storage,
     Slot::StorageMut,
 ];
 
@@ -71,6 +73,9 @@ pub(crate) const BLEND_SLOTS: [Slot; 3] = [Slot::Uniform, Slot::Storage, Slot::S
 
 /// Steps of flux in one of change. Twin of `CHANGE_SHIFT` in `shaders/pass/photon_stream/stream_impacts.wgsl`.
 pub(crate) const CHANGE_SHIFT: u32 = 4;
+
+/// Workgroups of a dispatch along an axis: one a texel.
+const MOST_A_FRAME: u32 = 65_535;
 
 /// Speed against accuracy, settable every frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -139,6 +144,8 @@ pub struct TexelGatherInputs<'a> {
     pub rays: &'a SurfaceRays,
     /// Written.
     pub map: &'a mut IlluminationMap,
+    /// Turns the rays: another in each frame that is accumulated, constant in real time.
+    pub sample_offset: u32,
     /// How.
     pub settings: &'a TexelGatherSettings,
     /// Sink for GPU time.
@@ -229,11 +236,8 @@ impl TexelGather {
         let map = &*inputs.map;
         let settings = inputs.settings;
         let rays = settings.rays.clamp(1, inputs.rays.count().max(1));
-        let budget = settings
-            .a_frame
-            .min(map.chosen().room())
-            .min(inputs.rays.count() / rays)
-            .max(1);
+        let room = map.chosen().room().min(inputs.rays.count() / rays);
+        let budget = settings.a_frame.min(MOST_A_FRAME).min(room).max(1);
         let (workgroups, row) = dispatch_64(budget * rays);
         let change = lights.flux_of_step() * (1u32 << CHANGE_SHIFT) as f32 / inputs.share;
         let params = gpu::Params {
@@ -247,6 +251,7 @@ impl TexelGather {
             flux_of_step: lights.flux_of_step() / inputs.share,
             blend: settings.blend,
             row,
+            sample_offset: inputs.sample_offset,
         };
         resources.frame = resources.frame.wrapping_add(1);
         inputs
@@ -267,6 +272,7 @@ impl TexelGather {
             map.surface_changes().into(),
             map.surface_areas().into(),
             lights.changes().into(),
+            map.gathered().into(),
             map.due().into(),
         ];
         let own = (&resources.params).into();

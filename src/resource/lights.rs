@@ -189,6 +189,11 @@ impl Lights {
         &self.written
     }
 
+    /// Of those that are flat.
+    pub(super) fn written_polygons(&self) -> &[gpu::Polygon] {
+        &self.written_polygons
+    }
+
     /// Whether each light written has an extent, and so a penumbra.
     pub(crate) fn have_extent(&self) -> impl Iterator<Item = bool> {
         self.written.iter().map(|l| l.extent > 0.0)

@@ -20,7 +20,7 @@ pub(crate) mod gpu {
 
 /// Exponents of 2 and 3 of the numbers of groups that a light may have: that many parts of nearly square shape the first two
 /// dimensions of the Halton sequence are cut into by what an index leaves when divided by their number.
-const PARTS: [[u32; 2]; 12] = [
+const PARTS: [[u32; 2]; 15] = [
     [0, 0],
     [1, 0],
     [1, 1],
@@ -30,10 +30,16 @@ const PARTS: [[u32; 2]; 12] = [
     [4, 2],
     [4, 3],
     [5, 3],
+    [6, 3],
+    [5, 4],
     [6, 4],
     [7, 4],
+    [8, 4],
     [8, 5],
 ];
+
+/// The last of these numbers.
+const MOST_PARTS: u32 = 62_208;
 
 /// Paths of [`Photons`] in groups (Larsen 2004, section 9.1): of each light, those whose index leaves the same when divided by 2^a 3^b
 /// start in the same part of its directions. With what is known of each group and of the paths that are traced anew.
@@ -50,6 +56,7 @@ pub struct PhotonGroups {
     kept_count: u32,
     written: Vec<gpu::GroupedLight>,
     lights: Vec<super::lights::gpu::LightRecord>,
+    polygons: Vec<super::lights::gpu::Polygon>,
 }
 
 /// What has become of the lights since they were last written.
@@ -63,7 +70,7 @@ pub(crate) enum LightsChange {
 
 impl PhotonGroups {
     /// For all paths of `photons`, some `per_group` in each (40 in the paper), of which up to `budget` are traced anew at once: at
-    /// least as many as a group has. Bytes: 4 a group, 48 a hop of each path that is traced anew.
+    /// least as many as a group has. Bytes: 4 a group, 48 a hop of each probe.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`].
@@ -71,8 +78,9 @@ impl PhotonGroups {
         use wgpu::BufferUsages as B;
         let (paths, per_group) = (photons.count(), per_group.max(1));
         let probes = most_groups(paths, per_group);
-        let chosen = (budget.min(paths) + 3 * per_group).max(1);
-        let kept_count = probes.max(chosen);
+        // And one more group, the largest that there may be.
+        let largest = (per_group.saturating_mul(3)).max(paths.div_ceil(MOST_PARTS));
+        let chosen = budget.saturating_add(largest).clamp(1, paths.max(1));
         let hops = photons.bounces() + 1;
         let usage = B::STORAGE | B::COPY_DST | B::COPY_SRC;
         let bytes = |count: u32, each: u64| u64::from(count) * each;
@@ -82,7 +90,7 @@ impl PhotonGroups {
             kept: device::buffer(
                 device,
                 "lightfall::PhotonGroups::kept",
-                bytes(kept_count, PHOTON_BYTES * u64::from(hops)),
+                bytes(probes, PHOTON_BYTES * u64::from(hops)),
                 usage,
             )?,
             counts: device::buffer(device, "lightfall::PhotonGroups::counts", 16, usage)?,
@@ -90,9 +98,10 @@ impl PhotonGroups {
             chosen: PathList::with_room(device, chosen)?,
             paths,
             per_group,
-            kept_count,
+            kept_count: probes,
             written: Vec::new(),
             lights: Vec::new(),
+            polygons: Vec::new(),
         })
     }
 
@@ -111,10 +120,18 @@ impl PhotonGroups {
             first_group += group_count;
         }
         let before = std::mem::replace(&mut self.lights, lights.records().to_vec());
+        let is_area = |l: &super::lights::gpu::LightRecord| l.kind == super::lights::gpu::AREA;
+        let mut flat = 0;
+        if self.polygons != lights.written_polygons() {
+            self.polygons = lights.written_polygons().to_vec();
+            let areas = self.lights.iter().enumerate().filter(|(_, l)| is_area(l));
+            flat = areas.map(|(i, _)| 1u64 << i).sum();
+        }
         if grouped == self.written {
             let pairs = before.iter().zip(&self.lights).enumerate();
             let moved = pairs.filter(|(_, (before, now))| before != now);
-            return LightsChange::Moved(moved.map(|(i, _)| 1u64 << i).sum());
+            let moved: u64 = moved.map(|(i, _)| 1u64 << i).sum();
+            return LightsChange::Moved(moved | flat);
         }
         queue.write_buffer(&self.grouped, 0, bytemuck::cast_slice(&grouped));
         self.written = grouped;
@@ -152,8 +169,7 @@ impl PhotonGroups {
         &self.chosen
     }
 
-    /// Of the list that was kept last, what its paths were before they were traced anew: slot hop × [`PhotonGroups::kept_count`] + place
-    /// in the list, 48 bytes each.
+    /// What the probes were before they were traced anew: slot hop × [`PhotonGroups::kept_count`] + place in the list, 48 bytes each.
     pub fn kept(&self) -> &wgpu::Buffer {
         &self.kept
     }
@@ -190,14 +206,15 @@ fn parts_of(paths: u32, per_group: u32) -> u32 {
     let wanted = f64::from(paths) / f64::from(per_group);
     let off = |parts: u32| (f64::from(parts) / wanted.max(1.0)).ln().abs();
     let numbers = PARTS.map(|[a, b]| 2u32.pow(a) * 3u32.pow(b));
-    let fitting = numbers.into_iter().filter(|&n| n <= paths);
+    let most = paths.min(2 * paths.div_ceil(per_group));
+    let fitting = numbers.into_iter().filter(|&n| n <= most);
     fitting.min_by(|&a, &b| off(a).total_cmp(&off(b))).unwrap_or(0)
 }
 
 /// As many groups as there may be, however paths are divided among lights.
 fn most_groups(paths: u32, per_group: u32) -> u32 {
-    // Numbers of parts grow by three at most from one to the next: the nearest is off by √3 at most.
-    2 * paths.div_ceil(per_group) + MAX_LIGHTS as u32
+    // Each light's are at most twice those of its share, rounded up.
+    paths.min(2 * paths.div_ceil(per_group) + 2 * MAX_LIGHTS as u32).max(1)
 }
 
 #[cfg(test)]
@@ -207,12 +224,20 @@ mod tests {
 
     #[test]
     fn groups_are_about_as_large_as_wanted_and_never_more_than_there_is_room_for() {
-        for paths in [0, 1, 39, 40, 100, 3080, 60_000, 400_000, 5_000_000] {
-            let groups = parts_of(paths, 40);
-            assert!(groups <= paths && groups <= most_groups(paths, 40));
-            if (100..400_000).contains(&paths) {
-                let size = f64::from(paths) / f64::from(groups);
-                assert!((20.0..75.0).contains(&size), "{paths}: {size}");
+        for per_group in [1, 7, 40, 1000] {
+            for paths in (0..2000).chain((2000..1_300_000).step_by(997)) {
+                let groups = parts_of(paths, per_group);
+                assert!(groups <= paths && groups <= most_groups(paths, per_group));
+                if per_group == 40 && paths >= 100 {
+                    let size = f64::from(paths) / f64::from(groups);
+                    assert!((20.0..85.0).contains(&size), "{paths}: {size}");
+                }
+            }
+            for lights in [2, 3, 5, 64] {
+                for each in [1, 40, 1000, 100_000, 101_000] {
+                    let groups = lights * parts_of(each, per_group);
+                    assert!(groups <= most_groups(lights * each, per_group), "{lights} of {each}");
+                }
             }
         }
         assert_eq!(parts_of(3080, 40), 72);

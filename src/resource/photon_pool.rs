@@ -38,13 +38,13 @@ pub struct PhotonPool {
 }
 
 impl PhotonPool {
-    /// Bytes of a pool.
+    /// Bytes of a pool, without photons near by.
     pub fn size_in_bytes(paths: u32, hops: u32) -> u64 {
         u64::from(paths.max(1)) * u64::from(hops.max(1)) * size_of::<gpu::Impact>() as u64
     }
 
     /// Room for `paths` of up to `hops` impacts each: [`Photons::bounces`](super::Photons::bounces) + 1 of the photons
-    /// that are streamed.
+    /// that are streamed; as many as bounces where photons near by are kept.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`].
@@ -64,9 +64,9 @@ impl PhotonPool {
         })
     }
 
-    /// Keeps of each path one of the photons that came a short way at most, from now on: for what lights that are discs
+    /// Keeps of each path one of the photons that came a short way at most, from now on, 48 bytes each: for what lights that are discs
     /// ([`LightShape::Disc`](crate::pass::LightShape::Disc)) lose near by. The photons that are streamed have one hop more then, whose
-    /// light ends there.
+    /// light ends there. Unlike impacts these do not move along with what they lie on, but are replaced with their paths.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`].
@@ -76,13 +76,23 @@ impl PhotonPool {
         Ok(())
     }
 
-    /// Has lights note what comes and goes from now on ([`SurfaceLights::changes`](super::SurfaceLights::changes)).
+    /// Has lights note what comes and goes from now on ([`SurfaceLights::changes`](super::SurfaceLights::changes)): the last hop for
+    /// that alone, for whoever asks what has changed is lit by the hops before.
     pub fn note_changes(&mut self) {
         self.notes_changes = true;
     }
 
     pub(crate) fn notes_changes(&self) -> bool {
         self.notes_changes
+    }
+
+    /// Whether it is not full of photons since the last restart, or waits for the first.
+    pub fn is_filling(&self) -> bool {
+        self.is_stale || self.streamed < u64::from(self.paths)
+    }
+
+    pub(crate) fn is_stale(&self) -> bool {
+        self.is_stale
     }
 
     /// What lights that are discs lose near by, one photon a path or none, for
@@ -97,15 +107,18 @@ impl PhotonPool {
     pub fn restart(&mut self) {
         self.is_stale = true;
         self.next = 0;
-        self.streamed = 0;
     }
 
     /// Of so many new paths, the place of the first; whether the pool is to be emptied before.
     pub(crate) fn advance(&mut self, paths: u32) -> (u32, bool) {
+        let is_stale = std::mem::take(&mut self.is_stale);
+        if is_stale {
+            self.streamed = 0;
+        }
         let first = self.next;
         self.next = (first + paths) % self.paths;
         self.streamed += u64::from(paths);
-        (first, std::mem::take(&mut self.is_stale))
+        (first, is_stale)
     }
 
     /// The impacts.

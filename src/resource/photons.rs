@@ -63,6 +63,9 @@ impl Photon {
     /// Bit of `state` that marks a photon at its light, whose first hop is not traced yet.
     pub const STARTED: u32 = 1024;
 
+    /// Bit of `state` that marks one for which a caustic map stands.
+    pub(crate) const CAUSTIC: u32 = 4096;
+
     pub(crate) const GUIDANCE_ONE: f32 = 128.0;
     pub(crate) const GUIDANCE_STEPS: f32 = 8.0;
 
@@ -154,7 +157,7 @@ pub enum PhotonMap {
 }
 
 /// Photon records of `count` paths of up to `bounces` scatterings: slot `b` × `count` + `i` is hop `b` of path `i`.
-/// Hop 0 ends at the first surface that light from the source meets.
+/// Hop 0 ends at the first surface that light from the source meets; of what [`PhotonPool::near`](super::PhotonPool::near) holds, at any.
 #[derive(Debug)]
 pub struct Photons {
     buffer: wgpu::Buffer,

@@ -16,6 +16,7 @@ mod mesh;
 pub mod samples;
 mod summary;
 mod suns;
+mod surface_partition;
 mod surface_points;
 mod unit_frame;
 
@@ -31,6 +32,7 @@ pub use material::{Material, Texture};
 pub use mesh::Mesh;
 pub use summary::SceneSummary;
 pub use suns::Sun;
+pub use surface_partition::SurfacePartition;
 pub use surface_points::{SurfacePlace, SurfacePoint};
 pub use unit_frame::UnitFrame;
 

@@ -12,6 +12,6 @@ struct Params {
     row: u32,
     // Share of the pool that the new paths are: what the flux of each is multiplied by
     share: f32,
-    // 1: what comes and goes is noted
+    // 1: what comes and goes is noted, of one hop more as well
     keeps_changes: u32,
 }

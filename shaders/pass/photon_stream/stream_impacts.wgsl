@@ -17,7 +17,7 @@
 const CHANGE_SHIFT: u32 = 4u;
 
 fn note_change(impact: Impact, is_indirect: bool) {
-    let change = (impact.red >> CHANGE_SHIFT) + (impact.green >> CHANGE_SHIFT) + (impact.blue >> CHANGE_SHIFT);
+    let change = (impact.red + impact.green + impact.blue) >> CHANGE_SHIFT;
     atomicAdd(&changes[impact.light][0], change);
     if is_indirect {
         atomicAdd(&changes[impact.light][1], change);
@@ -44,23 +44,25 @@ fn exchange(photon: Photon, slot: u32, hop: u32) {
     pool[slot] = now;
     let is_same = all(vec4u(before.light, before.red, before.green, before.blue) == vec4u(now.light, now.red, now.green, now.blue));
     let keeps_changes = params.keeps_changes == 1u && !is_same;
-    if impact_counts(before) {
+    // What arrives last is of use for its changes alone.
+    let goes_on = hop < params.hop_count;
+    if impact_counts(before) && goes_on {
         atomicSub(&flux[before.light][0], before.red);
         atomicSub(&flux[before.light][1], before.green);
         atomicSub(&flux[before.light][2], before.blue);
         atomicSub(&flux[before.light][3], 1u);
-        if keeps_changes {
-            note_change(before, hop > 0u);
-        }
     }
-    if impact_counts(now) {
+    if impact_counts(now) && goes_on {
         atomicAdd(&flux[now.light][0], now.red);
         atomicAdd(&flux[now.light][1], now.green);
         atomicAdd(&flux[now.light][2], now.blue);
         atomicAdd(&flux[now.light][3], 1u);
-        if keeps_changes {
-            note_change(now, hop > 0u);
-        }
+    }
+    if impact_counts(before) && keeps_changes {
+        note_change(before, hop > 0u);
+    }
+    if impact_counts(now) && keeps_changes {
+        note_change(now, hop > 0u);
     }
 }
 
@@ -68,7 +70,7 @@ fn exchange(photon: Photon, slot: u32, hop: u32) {
 @compute @workgroup_size(64)
 fn stream_impacts(@builtin(global_invocation_id) id: vec3u) {
     let index = id.y * params.row + id.x;
-    if index >= params.path_count * params.hop_count {
+    if index >= params.path_count * (params.hop_count + params.keeps_changes) {
         return;
     }
     let hop = index / params.path_count;

@@ -8,7 +8,7 @@ fn stream_listed(@builtin(global_invocation_id) id: vec3u) {
     if place >= listed.count {
         return;
     }
-    for (var hop = 0u; hop < params.hop_count; hop++) {
+    for (var hop = 0u; hop < params.hop_count + params.keeps_changes; hop++) {
         let slot = hop * params.pool_count + listed.paths[place];
         exchange(photons[slot], slot, hop);
     }

@@ -21,7 +21,11 @@ fn brightness(photon: Photon) -> f32 {
 
 // Whether a photon arrived elsewhere than before, at something else, or with another flux.
 fn has_diverged(before: Photon, now: Photon) -> bool {
-    if (before.state & PHOTON_STATE_MASK) != (now.state & PHOTON_STATE_MASK) {
+    if (now.state & PHOTON_STATE_MASK) == PHOTON_EMPTY {
+        return (before.state & PHOTON_STATE_MASK) != PHOTON_EMPTY;
+    }
+    // How the surface scatters is among the bits of both.
+    if before.state != now.state || before.light_and_surface != now.light_and_surface {
         return true;
     }
     if (now.state & PHOTON_STATE_MASK) != PHOTON_STORED {
@@ -30,7 +34,6 @@ fn has_diverged(before: Photon, now: Photon) -> bool {
     let flux = abs(before.flux - now.flux);
     let least = params.flux_tolerance * max(before.flux, now.flux);
     return distance(before.position, now.position) > params.position_tolerance
-        || photon_surface(before.light_and_surface) != photon_surface(now.light_and_surface)
         || before.reflectance != now.reflectance
         || any(flux > least);
 }

@@ -1,4 +1,4 @@
-// What listed paths were, before they are traced anew.
+// What probes were, before they are traced anew.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> photons: array<Photon>;

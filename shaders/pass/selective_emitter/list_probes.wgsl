@@ -19,8 +19,12 @@ fn has_moved(group: u32) -> bool {
 @compute @workgroup_size(64)
 fn list_probes(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {
     let index = id.y * groups.x * 64u + id.x;
-    if index < params.group_count && has_moved(index) {
-        changed[index] = min(changed[index] + LIGHT_MOVED, MOST_CHANGED);
+    if index < params.group_count {
+        // Those that wait gain on what changes again.
+        var change = changed[index];
+        change += select(0u, 1u + change / 16u, change > 0u);
+        change += select(0u, LIGHT_MOVED, has_moved(index));
+        changed[index] = min(change, MOST_CHANGED);
     }
     let count = (params.group_count - params.first_group + params.interval - 1u) / params.interval;
     if index == 0u {

@@ -17,4 +17,5 @@ struct Params {
     blend: f32,
     // Invocations in a row of the dispatch over rays
     row: u32,
+    sample_offset: u32,
 }

@@ -24,7 +24,7 @@ fn brought(index: u32) -> vec3f {
     }
     let ray = rays[index];
     let light = nearest_light(ray.position + hit.distance * ray.direction, octahedral_unpack(hit.normal));
-    if light == NO_LIGHT {
+    if light == NO_LIGHT || lights[light].area <= 0.0 {
         return vec3f(0.0);
     }
     return vec3f(flux[light].xyz) * (params.flux_of_step / lights[light].area);
