@@ -143,7 +143,7 @@ fn while_nothing_changes_no_texel_is_gathered_and_no_bit_changes() {
     let mut offline = offline(&gpu, &rooms(1.0), &settings(&[]));
     offline.render_frame(None).unwrap();
     let (first, picture) = (texels(&gpu, &offline), offline.read().unwrap());
-    assert!(first.iter().filter(|t| t.1[3] == 1.0).count() > 300);
+    assert!(first.iter().filter(|t| t.1[3] > 0.5).count() > 300);
     for _ in 0..5 {
         offline.render_frame(None).unwrap();
         assert_eq!(counts(&gpu, &offline), [0, 0]);
@@ -247,7 +247,7 @@ fn small_changes_wait_until_they_add_up() {
     let settings = settings(&[("illumination_maps.threshold", "1e6"), ("selective.budget", "20000")]);
     let mut offline = offline(&gpu, &scene, &settings);
     let before = texels(&gpu, &offline);
-    assert!(before.iter().all(|t| t.1[3] == 1.0), "each is gathered once");
+    assert!(before.iter().all(|t| t.1[3] > 0.0), "each is gathered once");
     let changes = |offline: &Offline<'_>| -> u64 {
         let lights = offline.renderer.surface_lights().unwrap();
         let all: Vec<[u32; 2]> = read_buffer_blocking(&gpu.device, &gpu.queue, lights.changes()).unwrap();

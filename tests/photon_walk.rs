@@ -286,7 +286,9 @@ fn some_paths_walked_alone_are_those_of_the_whole_walk_and_others_stay() {
     let Some(gpu) = gpu() else { return };
     let world = World::new(&gpu, &samples::pillars(0.3));
     let first = world.first_hits();
-    let mut some: Vec<u32> = (0..first.len() as u32).filter(|i| i % 7 == 3 || i % 11 == 0).collect();
+    let mut some: Vec<u32> = (0..first.len() as u32)
+        .filter(|i| i % 7 == 3 || i.is_multiple_of(11))
+        .collect();
     // In no particular order.
     some.reverse();
     let whole = [(); 2].map(|()| upload(&gpu, first.len(), &first));
@@ -304,7 +306,7 @@ fn some_paths_walked_alone_are_those_of_the_whole_walk_and_others_stay() {
         assert!(whole.iter().filter(|p| p.state() == PhotonState::Stored).count() > 2 * first.len());
         for (slot, (whole, part)) in whole.iter().zip(&part).enumerate().skip(first.len()) {
             let path = (slot % first.len()) as u32;
-            match path % 7 == 3 || path % 11 == 0 {
+            match path % 7 == 3 || path.is_multiple_of(11) {
                 true => assert!(agree(whole, part), "slot {slot}"),
                 false => assert!(*part == bytemuck::Zeroable::zeroed(), "slot {slot}"),
             }

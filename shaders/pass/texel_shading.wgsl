@@ -23,6 +23,8 @@ struct Params {
 // Cosine of the largest angle between the normals of a pixel and of a texel, and how much more distance off the plane counts, squared.
 const TEXEL_SAME_WAY: f32 = 0.5;
 const TEXEL_OFF_PLANE: f32 = 30.0;
+// Share of what a texel sees that must not be backs, or it stands inside of something and does not count.
+const TEXEL_OPEN: f32 = 0.5;
 // Of what the texels around are, no pixel is more.
 const TEXEL_MOST: f32 = 2.0;
 // Weight that keeps the plane level where few texels say how it slopes.
@@ -51,7 +53,7 @@ fn fit_cell(found: Fit, cell: vec3u, p: vec3f, frame: mat3x3f, reach: f32) -> Fi
         let texel = cells[entries + i];
         let cosine = dot(lights[texel].normal, frame[2]);
         let light = texels[texel];
-        if cosine < TEXEL_SAME_WAY || light.a == 0.0 {
+        if cosine < TEXEL_SAME_WAY || light.a < TEXEL_OPEN {
             continue;
         }
         let away = (lights[texel].position - p) * frame / reach;

@@ -63,7 +63,9 @@ impl IlluminationMap {
         }
     }
 
-    /// Irradiance that is shown, of each texel RGB in the unit frame and 1, or 0 before it was gathered: four `f32`.
+    /// Irradiance that is shown, of each texel RGB in the unit frame, and alpha: which share of its rays did not meet
+    /// backs of surfaces, but 2^-10 at least; 0 before it was gathered. Four `f32`. Texels whose alpha is below a half stand inside of
+    /// something, and do not count.
     pub fn shown(&self) -> &wgpu::Buffer {
         &self.shown
     }

@@ -64,7 +64,7 @@ impl Photon {
     pub const STARTED: u32 = 1024;
 
     /// Bit of `state` that marks one for which a caustic map stands.
-    pub(crate) const CAUSTIC: u32 = 4096;
+    pub const CAUSTIC: u32 = 4096;
 
     pub(crate) const GUIDANCE_ONE: f32 = 128.0;
     pub(crate) const GUIDANCE_STEPS: f32 = 8.0;

@@ -2,7 +2,7 @@
 
 use super::{Mesh, Scene};
 use crate::Error;
-use glam::{DMat3, DVec3, IVec3, Vec3};
+use glam::{DMat3, DVec3, Vec3};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
@@ -215,11 +215,13 @@ impl Edges {
         let low = positions().reduce(DVec3::min).unwrap_or(DVec3::ZERO);
         let high = positions().reduce(DVec3::max).unwrap_or(DVec3::ZERO);
         let step = (WELD * (high - low).max_element()).max(f64::MIN_POSITIVE);
-        let mut numbers = HashMap::<IVec3, u32>::new();
+        let mut numbers = HashMap::<[i64; 3], u32>::new();
         let welded: Vec<u32> = positions()
             .map(|p| {
                 let next = numbers.len() as u32;
-                *numbers.entry(((p - low) / step).round().as_ivec3()).or_insert(next)
+                *numbers
+                    .entry(((p - low) / step).round().to_array().map(|v| v as i64))
+                    .or_insert(next)
             })
             .collect();
         let mut edges = Self {
@@ -284,7 +286,7 @@ mod tests {
 
     /// A grid of so many quads whose corners rise and fall.
     fn bumpy(side: u32, height: f32) -> Mesh {
-        let at = |x: u32, y: u32| [x as f32, if (x + y) % 2 == 0 { height } else { 0.0 }, y as f32];
+        let at = |x: u32, y: u32| [x as f32, if (x + y).is_multiple_of(2) { height } else { 0.0 }, y as f32];
         let mut mesh = Mesh::default();
         for (x, y) in (0..side).flat_map(|x| (0..side).map(move |y| (x, y))) {
             let first = mesh.positions.len() as u32;

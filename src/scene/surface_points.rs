@@ -2,7 +2,7 @@
 
 use super::{Instance, Mesh, Scene, SurfacePartition};
 use crate::halton::radical_inverse;
-use glam::{DAffine3, DMat3, DVec3, IVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 /// Share of a triangle's extent that points are placed in, around its centroid: they stay away from its edges.
 const SHRUNK: f64 = 0.9;
@@ -210,18 +210,21 @@ fn cell_areas(instances: &[SampledInstance<'_>], placed: &[Placed]) -> Vec<f64> 
     areas
 }
 
+fn cell_of(position: DVec3, side: f64) -> [i64; 3] {
+    (position / side).floor().to_array().map(|v| v as i64)
+}
+
 /// Points by cells of space.
 struct Cells {
     side: f64,
-    points: std::collections::HashMap<IVec3, Vec<usize>>,
+    points: std::collections::HashMap<[i64; 3], Vec<usize>>,
 }
 
 impl Cells {
     fn new(placed: &[Placed], side: f64) -> Self {
         let mut points = std::collections::HashMap::<_, Vec<_>>::new();
         for (index, p) in placed.iter().enumerate() {
-            let cell = (p.place.position / side).floor().as_ivec3();
-            points.entry(cell).or_default().push(index);
+            points.entry(cell_of(p.place.position, side)).or_default().push(index);
         }
         Self { side, points }
     }
@@ -236,15 +239,18 @@ impl Cells {
         // Each place has a light on either side.
         let cosine = |point: usize| placed[point].place.normal.dot(own.normal).abs();
         let is_facing = |point: &&usize| cosine(**point) >= SAME_WAY;
-        let middle = (own.position / self.side).floor().as_ivec3();
-        for rings in 1..=3i32 {
+        let middle = cell_of(own.position, self.side);
+        for rings in 1..=3i64 {
             let width = 2 * rings + 1;
-            let around = (0..width.pow(3)).map(|i| IVec3::new(i % width, i / width % width, i / width.pow(2)) - rings);
-            let near = around.filter_map(|cell| self.points.get(&(middle + cell))).flatten();
+            let around = (0..width.pow(3)).map(|i| {
+                let offset = [i % width, i / width % width, i / width.pow(2)];
+                [0, 1, 2].map(|axis: usize| middle[axis] + offset[axis] - rings)
+            });
+            let near = around.filter_map(|cell| self.points.get(&cell)).flatten();
             let near = near.filter(is_facing);
             let found = near.min_by(|a, b| cost(a).total_cmp(&cost(b)));
             // Whatever lies in other cells is this far away at least.
-            let reach = (f64::from(rings) * self.side).powi(2);
+            let reach = (rings as f64 * self.side).powi(2);
             if let Some(found) = found.filter(|f| cost(f) <= reach) {
                 return *found;
             }

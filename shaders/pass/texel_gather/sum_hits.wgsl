@@ -13,27 +13,33 @@
 
 const LANES: u32 = 64u;
 
-var<workgroup> sums: array<vec3f, LANES>;
+// Light, and how many rays meet backs
+var<workgroup> sums: array<vec4f, LANES>;
+
+// Alpha of a texel that was gathered, at least.
+const LEAST_ALPHA: f32 = 0x1p-10;
 
 // What a ray brings. What is lost brings nothing, nor do metal and glass, which hold no light.
-fn brought(index: u32) -> vec3f {
+fn brought(index: u32) -> vec4f {
     let hit = hits[index];
     let is_hit = hit.kind == HIT_SURFACE || hit.kind == HIT_TENTATIVE;
+    let is_back = is_hit && (hit.lobe & HIT_BACK) != 0u;
+    let nothing = vec4f(vec3f(0.0), f32(is_back));
     if !is_hit || lobe_is_specular(hit.lobe) {
-        return vec3f(0.0);
+        return nothing;
     }
     let ray = rays[index];
     let light = nearest_light(ray.position + hit.distance * ray.direction, octahedral_unpack(hit.normal));
     if light == NO_LIGHT || lights[light].area <= 0.0 {
-        return vec3f(0.0);
+        return nothing;
     }
-    return vec3f(flux[light].xyz) * (params.flux_of_step / lights[light].area);
+    return vec4f(vec3f(flux[light].xyz) * (params.flux_of_step / lights[light].area), nothing.a);
 }
 
 @compute @workgroup_size(64)
 fn sum_hits(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let first = params.ray_count * group.x;
-    var sum = vec3f(0.0);
+    var sum = vec4f(0.0);
     for (var i = lane; i < params.ray_count; i += LANES) {
         sum += brought(first + i);
     }
@@ -46,6 +52,8 @@ fn sum_hits(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index
         workgroupBarrier();
     }
     if lane == 0u {
-        gathered[chosen.paths[group.x]] = vec4f(sums[0] / f32(params.ray_count), 1.0);
+        // What sees backs stands inside of something.
+        let mean = sums[0] / f32(params.ray_count);
+        gathered[chosen.paths[group.x]] = vec4f(mean.rgb, max(1.0 - mean.a, LEAST_ALPHA));
     }
 }
