@@ -4,8 +4,8 @@
 //! cargo run --release --example surface_light_study -- sample:cornell sample:colonnade
 //! ```
 //!
-//! Times are of the shading alone, at every pixel and without shadows, on the wall: medians of rounds in which each form has its
-//! turn. Growth is the exponent of time by the number of lights between the two largest numbers, 1 if twice the lights take
+//! Times are of the shading alone, at every pixel and without shadows, on the wall: medians of rounds in which each form has
+//! its turn. Growth is the exponent of time by the number of lights between the two largest numbers, 1 if twice the lights take
 //! twice the time.
 
 mod common;

@@ -1,7 +1,8 @@
-// Chooses candidates of the highest priorities, as many as a budget allows: by one workgroup. Priorities are told apart by their powers of
-// two; of those of the last power that fits, the first ones from a place on that turns. The module brings
+// Chooses candidates of the highest priorities, as many as a budget allows: by one workgroup. Priorities are told apart by
+// their powers of two; of those of the last power that fits, the first ones from a place on that turns. The module brings
 // `candidate_count()`, `candidate_budget()`, `candidate_turn()`; of each candidate `candidate_priority(i)`, 0: it is none, and
-// `candidate_size(i)`; and `take_candidate(i, at)`, which is called in an order that is always the same, `at` the sizes before it.
+// `candidate_size(i)`; and `take_candidate(i, at)`, which is called in an order that is always the same, `at` the sizes before
+// it.
 
 const CHOICE_LANES: u32 = 256u;
 

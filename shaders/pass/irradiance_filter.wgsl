@@ -1,5 +1,5 @@
-// Irradiance evened out along surfaces: a joint bilateral filter over the pixels around, each weighing less the further it is on
-// the screen, the more its normal turns and the further it lies off the tangent plane.
+// Irradiance evened out along surfaces: a joint bilateral filter over the pixels around, each weighing less the further it is
+// on the screen, the more its normal turns and the further it lies off the tangent plane.
 
 struct Params {
     // Pixels of the G-buffer for each one of the irradiance, along each axis

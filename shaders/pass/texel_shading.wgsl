@@ -1,5 +1,5 @@
-// Irradiance at a pixel from that of the texels around it: a plane is laid through them, by least squares that weigh near ones more
-// (moving least squares), for at the edges of surfaces all texels lie to one side.
+// Irradiance at a pixel from that of the texels around it: a plane is laid through them, by least squares that weigh near ones
+// more (moving least squares), for at the edges of surfaces all texels lie to one side.
 
 struct Params {
     // Pixels of the G-buffer along each axis for one of the irradiance
@@ -20,7 +20,8 @@ struct Params {
 @group(0) @binding(9) var<storage, read> texels: array<vec4f>;
 @group(0) @binding(10) var irradiance: texture_storage_2d<rgba32float, write>;
 
-// Cosine of the largest angle between the normals of a pixel and of a texel, and how much more distance off the plane counts, squared.
+// Cosine of the largest angle between the normals of a pixel and of a texel, and how much more distance off the plane counts,
+// squared.
 const TEXEL_SAME_WAY: f32 = 0.5;
 const TEXEL_OFF_PLANE: f32 = 30.0;
 // Share of what a texel sees that must not be backs, or it stands inside of something and does not count.

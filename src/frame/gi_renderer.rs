@@ -138,8 +138,8 @@ pub struct SceneInputs<'a> {
     /// The same geometry as triangles, prepared for this frame: what [`Stage::BvhTracer`] needs while it is on.
     #[cfg(feature = "bvh")]
     pub bvh: Option<&'a BvhGeometry>,
-    /// First index into the random sequence: constant in real time; advanced by the number of photons per frame, or by 1 if there
-    /// are none, when accumulating.
+    /// First index into the random sequence: constant in real time; advanced by the number of photons per frame, or by 1 if
+    /// there are none, when accumulating.
     pub sample_offset: u32,
     /// Sink for GPU time.
     pub timestamps: Option<&'a Timestamps>,
@@ -227,13 +227,12 @@ impl GiRenderer {
         })
     }
 
-    /// Gives the image that an environment light refers to, whatever the index in [`LightKind::Environment`]: of a `Scene` that of
-    /// [`Scene::environment_image`](crate::scene::Scene::environment_image). `None` drops it. Uploads it, and divides it into
-    /// suns with the next `set_scene`: call it before that, when the image changes, not every frame.
+    /// Gives the image that an environment light refers to, whatever the index in [`LightKind::Environment`]: of a `Scene` that
+    /// of [`Scene::environment_image`](crate::scene::Scene::environment_image). `None` drops it. Uploads it, and divides it
+    /// into suns with the next `set_scene`: call it before that, when the image changes, not every frame.
     ///
-    /// # Errors
-    /// As [`EnvironmentImage::validate`]; [`Error::LimitExceeded`] for one that is larger than a texture may be. The old one stays
-    /// then.
+    /// # Errors As [`EnvironmentImage::validate`]; [`Error::LimitExceeded`] for one that is larger than a texture may be. The
+    /// old one stays then.
     pub fn set_environment(&mut self, queue: &wgpu::Queue, image: Option<&EnvironmentImage>) -> Result<(), Error> {
         self.environment = match image {
             Some(image) => Environment::new(&self.device, queue, image)?,
@@ -403,9 +402,9 @@ impl GiRenderer {
     /// call it after `set_scene` and before `prepare`. Does nothing where the settings need no environment maps.
     ///
     /// Where places are chosen by what photons reach ([`CoverageMeasure::Photons`](crate::pass::CoverageMeasure)), photons are
-    /// traced for it, through maps in places chosen by area, then through better ones. Triangles are not at hand here: where the
-    /// settings trace them alone, the first hits of photons decide (of lamps there are none), and the frames that follow choose
-    /// better by all of them.
+    /// traced for it, through maps in places chosen by area, then through better ones. Triangles are not at hand here: where
+    /// the settings trace them alone, the first hits of photons decide (of lamps there are none), and the frames that follow
+    /// choose better by all of them.
     ///
     /// # Errors
     /// [`Error::ReadBack`], [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
@@ -612,9 +611,9 @@ impl GiRenderer {
         self.photon_feeder.as_ref()
     }
 
-    /// Traces all of the photons that surface lights are made of, at once instead of over many frames: at the start, after a cut.
-    /// Submits what it records and does not wait; call it after `prepare`, before `record_scene`. Nothing where there is no
-    /// pool, or threads of the processor fill it.
+    /// Traces all of the photons that surface lights are made of, at once instead of over many frames: at the start, after a
+    /// cut. Submits what it records and does not wait; call it after `prepare`, before `record_scene`. Nothing where there is
+    /// no pool, or threads of the processor fill it.
     ///
     /// # Errors
     /// As [`GiRenderer::record_scene`].
@@ -637,9 +636,9 @@ impl GiRenderer {
         self.submit_rounds(rounds, inputs)
     }
 
-    /// Forgets the illumination map, traces all photons and gathers all texels at once instead of over many frames: at the start, after a
-    /// cut. Submits what it records and does not wait; call it after `prepare`, before `record_scene`. Nothing where there is no
-    /// such map.
+    /// Forgets the illumination map, traces all photons and gathers all texels at once instead of over many frames: at the
+    /// start, after a cut. Submits what it records and does not wait; call it after `prepare`, before `record_scene`. Nothing
+    /// where there is no such map.
     ///
     /// # Errors
     /// As [`GiRenderer::record_scene`].

@@ -1,5 +1,5 @@
-//! Indirect light that is kept at texels of surfaces: photons that stay until their way changes, all light at texels as these come and
-//! go, and the texels' irradiance, gathered again where it has changed.
+//! Indirect light that is kept at texels of surfaces: photons that stay until their way changes, all light at texels as these
+//! come and go, and the texels' irradiance, gathered again where it has changed.
 
 use super::Settings;
 use super::indirect_scene::PhotonPasses;

@@ -64,8 +64,8 @@ struct Snapshot {
 }
 
 impl PhotonFeeder {
-    /// Starts `threads` threads, which trace `paths` paths at a time of up to `bounces` scatterings: as many as [`Photons`] that
-    /// they are for. They idle until there is a scene.
+    /// Starts `threads` threads, which trace `paths` paths at a time of up to `bounces` scatterings: as many as [`Photons`]
+    /// that they are for. They idle until there is a scene.
     pub fn new(paths: u32, bounces: u32, threads: usize) -> Self {
         let (scenes, new_scenes) = mpsc::channel();
         let (finished, batches) = mpsc::sync_channel(WAITING);
@@ -89,8 +89,8 @@ impl PhotonFeeder {
         }
     }
 
-    /// Says what the scene is from now on, and the unit frame that photons are wanted in. Batches of scenes before are not taken
-    /// any more.
+    /// Says what the scene is from now on, and the unit frame that photons are wanted in. Batches of scenes before are not
+    /// taken any more.
     pub fn set_scene(&self, frame: &UnitFrame, scene: &Arc<Scene>) {
         let snapshot = Snapshot {
             number: self.newest.fetch_add(1, Ordering::Relaxed) + 1,

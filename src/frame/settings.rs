@@ -50,16 +50,17 @@ pub enum IndirectMethod {
     /// From the photons around what a pixel sees.
     #[default]
     Splatting,
-    /// By rays from there, which bring back the light of lit environment maps. No kernel lies over an edge; noise is that of few
-    /// rays. It takes environment maps, whatever the tracer; rays meet what photons do. Light has one bounce more.
+    /// By rays from there, which bring back the light of lit environment maps. No kernel lies over an edge; noise is that of
+    /// few rays. It takes environment maps, whatever the tracer; rays meet what photons do. Light has one bounce more.
     FinalGather,
-    /// From virtual surface lights: points on surfaces that stand for the light of a pool of photons around them. Their number is that of
-    /// lights, and kernels are those of the few photons near by. It takes places,
+    /// From virtual surface lights: points on surfaces that stand for the light of a pool of photons around them. Their number
+    /// is that of lights, and kernels are those of the few photons near by. It takes places,
     /// [`GiRenderer::set_surface_places`](super::GiRenderer::set_surface_places), or stands them where photons arrive.
     SurfaceLights,
-    /// From irradiance kept at texels of surfaces, which is gathered again only where photons say that it has changed; photons stay until
-    /// their way changes ([`Settings::selective`], whatever it says, unless they are guided). Cheapest while little moves; light follows within some
-    /// frames. It takes places for texels, [`GiRenderer::set_surface_places`](super::GiRenderer::set_surface_places).
+    /// From irradiance kept at texels of surfaces, which is gathered again only where photons say that it has changed; photons
+    /// stay until their way changes ([`Settings::selective`], whatever it says, unless they are guided). Cheapest while little
+    /// moves; light follows within some frames. It takes places for texels,
+    /// [`GiRenderer::set_surface_places`](super::GiRenderer::set_surface_places).
     IlluminationMaps,
 }
 
@@ -95,11 +96,11 @@ pub struct SurfaceLightSettings {
     pub placement: LightPlacement,
     /// How they come to pixels.
     pub shading: SurfaceLightShadingSettings,
-    /// Whether photons that came a short way are splatted beside them, for what discs ([`LightShape::Disc`]) lose near by, and all that
-    /// came by way of metal and glass. Other shapes, and lights at impacts, have none.
+    /// Whether photons that came a short way are splatted beside them, for what discs ([`LightShape::Disc`]) lose near by, and
+    /// all that came by way of metal and glass. Other shapes, and lights at impacts, have none.
     pub near_photons: bool,
-    /// Photons under a kernel of these, above 0: among as many as the pool has paths, and all else as the splatter's settings say. Fewer
-    /// keep corners sharper and are noisier.
+    /// Photons under a kernel of these, above 0: among as many as the pool has paths, and all else as the splatter's settings
+    /// say. Fewer keep corners sharper and are noisier.
     pub near_kernel: f32,
     /// Estimated pixels to each side that the noise of [`IndirectShadows::Some`] is evened out over, 0 to 16.
     pub filter_radius: u32,
@@ -123,9 +124,10 @@ impl Default for SurfaceLightSettings {
     }
 }
 
-/// Photons that stay where they are until something changes on their way: of each group of similar directions one is traced a frame, and the
-/// others where it went elsewhere. Not for surface lights, which have a pool instead; not where photons are guided; and not in frames that
-/// are accumulated, each of which has photons of its own. What [`TracerKind::Hybrid`] traces, triangles alone then do.
+/// Photons that stay where they are until something changes on their way: of each group of similar directions one is traced a
+/// frame, and the others where it went elsewhere. Not for surface lights, which have a pool instead; not where photons are
+/// guided; and not in frames that are accumulated, each of which has photons of its own. What [`TracerKind::Hybrid`] traces,
+/// triangles alone then do.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SelectiveSettings {
     /// Whether they do.
@@ -149,8 +151,8 @@ impl Default for SelectiveSettings {
 /// Irradiance kept at texels of surfaces.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IlluminationMapSettings {
-    /// Places to choose, 1 to 16384: what a host gives to [`SurfacePoint::place`](crate::scene::SurfacePoint::place), with a texel on either
-    /// side. More resolve more; what follows a change costs in proportion.
+    /// Places to choose, 1 to 16384: what a host gives to [`SurfacePoint::place`](crate::scene::SurfacePoint::place), with a
+    /// texel on either side. More resolve more; what follows a change costs in proportion.
     pub texels: u32,
     /// How and when they are gathered.
     pub gather: TexelGatherSettings,
@@ -175,8 +177,8 @@ pub struct FinalGatherSettings {
     pub rays: u32,
     /// Texels of light along a face of an environment map, 4 to 8192. Finer resolves shadows, and costs as the square.
     pub map_size: u32,
-    /// Photons under a kernel there, above 0: kernels are all of one width. Fewer are faster and keep more detail; their noise is
-    /// evened out over the rays.
+    /// Photons under a kernel there, above 0: kernels are all of one width. Fewer are faster and keep more detail; their noise
+    /// is evened out over the rays.
     pub photons: f32,
     /// Estimated pixels to each side that the noise of rays is evened out over, 0 to 16. Pays with few rays: 64 want 1.
     pub filter_radius: u32,
@@ -299,7 +301,8 @@ pub struct Settings {
     pub tracer_kind: TracerKind,
     /// How rays are searched for in environment maps.
     pub trace_method: TraceMethod,
-    /// How far rays are followed. `roulette_from` counts for every kind of tracer; in a hybrid `most_fetches` of 0 stands for 400.
+    /// How far rays are followed. `roulette_from` counts for every kind of tracer; in a hybrid `most_fetches` of 0 stands for
+    /// 400.
     pub tracer: ImageSpaceTracerSettings,
     /// How indirect light comes to the pixels.
     pub indirect_method: IndirectMethod,
@@ -311,11 +314,11 @@ pub struct Settings {
     pub illumination_maps: IlluminationMapSettings,
     /// Light by way of metal and glass alone.
     pub caustic: CausticSettings,
-    /// Most specular surfaces that the eye looks through or into one behind the other, 1 to 32: a ball of glass has two. What lies
-    /// behind more is black.
+    /// Most specular surfaces that the eye looks through or into one behind the other, 1 to 32: a ball of glass has two. What
+    /// lies behind more is black.
     pub specular_surfaces: u32,
-    /// Paths from each pixel whose surface is specular, 1 to 64: noise of rough surfaces and of glass, which reflects or transmits
-    /// by chance, falls as their root.
+    /// Paths from each pixel whose surface is specular, 1 to 64: noise of rough surfaces and of glass, which reflects or
+    /// transmits by chance, falls as their root.
     pub specular_paths: u32,
     /// How rough metal is lit that the eye sees.
     pub glossy_method: GlossyMethod,
@@ -526,8 +529,8 @@ impl Settings {
         }
     }
 
-    /// Surfaces that photons scatter at, for a [`PhotonFeeder`](super::PhotonFeeder): of surface lights the last one shines by itself,
-    /// unless photons near by are kept.
+    /// Surfaces that photons scatter at, for a [`PhotonFeeder`](super::PhotonFeeder): of surface lights the last one shines by
+    /// itself, unless photons near by are kept.
     pub fn walked_bounces(&self) -> u32 {
         match self.indirect_method {
             IndirectMethod::SurfaceLights if !self.keeps_near() => self.bounces.saturating_sub(1),

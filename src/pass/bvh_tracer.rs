@@ -1,10 +1,11 @@
 //! Rays against the triangles themselves: the photon walk, and lists of rays.
 //!
-//! Inputs: [`BvhGeometry`], and [`Photons`] with hop 0, [`Rays`] or [`SurfaceRays`]. Output: [`Photons`], hops 1 to its number of
-//! bounces, and hop 0 of those that start on lamps, or of one hop those that another tracer lost ([`SharedHop`]), or hits of [`Rays`] or [`SurfaceRays`]. Cost: a ray visits some ten to thirty
-//! nodes of 80 bytes and a few triangles of 48 (`docs/tracing.md`). Sources: Ylitie et al. 2017 (compressed wide trees),
-//! Woop et al. 2013 (watertight triangles); Yao's general tracer, section 3.2. Limits: geometry that a host deforms on the
-//! GPU alone is not in the trees. No ray is lost: it meets a triangle or has escaped.
+//! Inputs: [`BvhGeometry`], and [`Photons`] with hop 0, [`Rays`] or [`SurfaceRays`]. Output: [`Photons`], hops 1 to its number
+//! of bounces, and hop 0 of those that start on lamps, or of one hop those that another tracer lost ([`SharedHop`]), or hits of
+//! [`Rays`] or [`SurfaceRays`]. Cost: a ray visits some ten to thirty nodes of 80 bytes and a few triangles of 48
+//! (`docs/tracing.md`). Sources: Ylitie et al. 2017 (compressed wide trees), Woop et al. 2013 (watertight triangles); Yao's
+//! general tracer, section 3.2. Limits: geometry that a host deforms on the GPU alone is not in the trees. No ray is lost: it
+//! meets a triangle or has escaped.
 
 use super::dispatch_64;
 use super::photon_guiding::Guiding;
@@ -86,7 +87,8 @@ pub struct BvhTracerInputs<'a> {
     pub queue: &'a wgpu::Queue,
     /// What photons meet, of the instances that environment maps see; prepared for this frame.
     pub geometry: &'a BvhGeometry,
-    /// Hop 0 is read, and written where it starts on a lamp; the others are written; of a shared hop, the one before it and the listed slots of its own.
+    /// Hop 0 is read, and written where it starts on a lamp; the others are written; of a shared hop, the one before it and the
+    /// listed slots of its own.
     pub photons: &'a Photons,
     /// `None`: the whole walk. A hop: this one, of the paths that the other tracer has listed.
     pub shared: Option<SharedHop<'a>>,

@@ -1,14 +1,14 @@
 //! Caustics from photons as points on the screen, evened out by a filter.
 //!
 //! Inputs: [`Photons`] of a caustic map, in one part or in several that are traced in turn; [`GBuffer`]. Output: [`Irradiance`]
-//! (`rgba32float`) at every pixel; alpha is 1 where a filter has been, else all is 0. E = Σ w Φ / Σ w A over the pixels within k of a
-//! pixel that see the same surface, w = √(1 + 2k² − x² − y²), A what each covers of it: brightness does not depend on distance or
-//! angle of view. Only tiles that photons reach are filtered. Source: Larsen 2004, chapter 12, Eq. 12.1 and 12.2, with changes: the
-//! area divides by the cosine; k comes from a length in the scene; pixels of other surfaces count neither above nor below the line;
-//! a list of tiles stands in for occlusion queries.
+//! (`rgba32float`) at every pixel; alpha is 1 where a filter has been, else all is 0. E = Σ w Φ / Σ w A over the pixels within
+//! k of a pixel that see the same surface, w = √(1 + 2k² − x² − y²), A what each covers of it: brightness does not depend on
+//! distance or angle of view. Only tiles that photons reach are filtered. Source: Larsen 2004, chapter 12, Eq. 12.1 and 12.2,
+//! with changes: the area divides by the cosine; k comes from a length in the scene; pixels of other surfaces count neither
+//! above nor below the line; a list of tiles stands in for occlusion queries.
 //!
-//! Cost: photons; of tiles that hold light, pixels × (2 k + 1)². Limits: a filter of the screen is no finer than a pixel and no wider
-//! than 15; photons hidden behind what the pixel sees are lost.
+//! Cost: photons; of tiles that hold light, pixels × (2 k + 1)². Limits: a filter of the screen is no finer than a pixel and no
+//! wider than 15; photons hidden behind what the pixel sees are lost.
 
 use super::dispatch_64;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
@@ -123,8 +123,8 @@ pub struct CausticFilterResources {
 pub struct CausticFilterInputs<'a> {
     /// For the uniforms of this frame.
     pub queue: &'a wgpu::Queue,
-    /// Light to show; hop 0 is left out. In several parts of as many paths each, where a part is traced anew a frame: each holds all
-    /// of the light.
+    /// Light to show; hop 0 is left out. In several parts of as many paths each, where a part is traced anew a frame: each
+    /// holds all of the light.
     pub photons: &'a [&'a Photons],
     /// Where it lands. Its view must be set, of no more pixels than the resources are made for.
     pub g_buffer: &'a GBuffer,
@@ -175,9 +175,8 @@ impl CausticFilter {
 
     /// Records the irradiance.
     ///
-    /// # Errors
-    /// [`Error::CountMismatch`] for photons in parts of unlike numbers, or a G-buffer of more pixels than the resources have room for;
-    /// nothing is recorded then.
+    /// # Errors [`Error::CountMismatch`] for photons in parts of unlike numbers, or a G-buffer of more pixels than the
+    /// resources have room for; nothing is recorded then.
     pub fn record(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -313,7 +312,8 @@ impl CausticFilterResources {
         })
     }
 
-    /// The tiles that were filtered last: three workgroup counts, how many, and their numbers, row by row of 8 × 8 pixels. All `u32`.
+    /// The tiles that were filtered last: three workgroup counts, how many, and their numbers, row by row of 8 × 8 pixels. All
+    /// `u32`.
     pub fn tiles(&self) -> &wgpu::Buffer {
         &self.tiles
     }

@@ -1,11 +1,12 @@
 //! Rays through environment maps: the photon walk, and lists of rays.
 //!
 //! Inputs: [`EnvMaps`], for most methods their [`DepthHierarchy`], and [`Photons`] with hop 0 or [`SurfaceRays`]. Output:
-//! [`Photons`], hops 1 to its number of bounces, and hop 0 of those that start on lamps; or one hop, and the list of the rays that it is not sure of, for another
-//! tracer ([`SharedHop`]); or hits of [`SurfaceRays`]. Cost, and errors, of every [`TraceMethod`]: `docs/tracing.md`. Source:
-//! Yao et al. 2010, sections 3 and 5; march, hierarchy and order are this crate's. Limits: metal and
-//! glass are as facetted as maps show them, and the inside of glass is not seen; geometry that no map sees lets rays pass or loses them; what became of every ray is in the photon records
-//! ([`TraceStatistics`](super::TraceStatistics) adds them up).
+//! [`Photons`], hops 1 to its number of bounces, and hop 0 of those that start on lamps; or one hop, and the list of the rays
+//! that it is not sure of, for another tracer ([`SharedHop`]); or hits of [`SurfaceRays`]. Cost, and errors, of every
+//! [`TraceMethod`]: `docs/tracing.md`. Source: Yao et al. 2010, sections 3 and 5; march, hierarchy and order are this crate's.
+//! Limits: metal and glass are as facetted as maps show them, and the inside of glass is not seen; geometry that no map sees
+//! lets rays pass or loses them; what became of every ray is in the photon records ([`TraceStatistics`](super::TraceStatistics)
+//! adds them up).
 
 use super::dispatch_64;
 use super::photon_guiding::Guiding;
@@ -165,7 +166,8 @@ pub struct ImageSpaceTracerInputs<'a> {
     pub env_maps: &'a EnvMaps,
     /// Of these maps; what [`TraceMethod::needs_hierarchy`].
     pub hierarchy: Option<&'a DepthHierarchy>,
-    /// Hop 0 is read, and written where it starts on a lamp; the others are written; of a shared hop, the one before it and itself.
+    /// Hop 0 is read, and written where it starts on a lamp; the others are written; of a shared hop, the one before it and
+    /// itself.
     pub photons: &'a Photons,
     /// `None`: the whole walk. A hop: this one, whose lost rays are listed.
     pub shared: Option<SharedHop<'a>>,

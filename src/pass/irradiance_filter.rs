@@ -1,10 +1,10 @@
 //! Evens out the noise of irradiance along surfaces and not across their edges.
 //!
-//! Input: [`Irradiance`] of some [`Subsampling`], [`GBuffer`]. Output: [`Irradiance`] (`rgba32float`) of the same size; alpha is
-//! that of the input. Each pixel becomes the mean of those around, which weigh 1 − d² / (r + 1)² at d pixels from it, times how
-//! well their normals agree and how near they lie to its tangent plane, as in [`Upsampler`](super::Upsampler); those of another
-//! surface, by their numbers, do not count. What is smooth already may be added at the same time. Source: joint bilateral filtering (Petschnigg et al. 2004), with the distance from
-//! the plane in the place of depth.
+//! Input: [`Irradiance`] of some [`Subsampling`], [`GBuffer`]. Output: [`Irradiance`] (`rgba32float`) of the same size; alpha
+//! is that of the input. Each pixel becomes the mean of those around, which weigh 1 − d² / (r + 1)² at d pixels from it, times
+//! how well their normals agree and how near they lie to its tangent plane, as in [`Upsampler`](super::Upsampler); those of
+//! another surface, by their numbers, do not count. What is smooth already may be added at the same time. Source: joint
+//! bilateral filtering (Petschnigg et al. 2004), with the distance from the plane in the place of depth.
 //!
 //! Cost: pixels × (2 r + 1)², some five texel fetches each. Limits: what is finer than the radius is blurred, contact shadows
 //! among it.
@@ -47,7 +47,8 @@ pub(crate) const MOST_RADIUS: u32 = 16;
 /// How far, and what fits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IrradianceFilterSettings {
-    /// Pixels of the irradiance to each side, up to 16; 0: it is copied. Wider is smoother and blurrier, and costs as the square.
+    /// Pixels of the irradiance to each side, up to 16; 0: it is copied. Wider is smoother and blurrier, and costs as the
+    /// square.
     pub radius: u32,
     /// As [`UpsamplerSettings::normal_agreement`](super::UpsamplerSettings::normal_agreement).
     pub normal_agreement: f32,

@@ -1,11 +1,11 @@
 //! Emits photons from every light and stores where they first land: hop 0 of [`Photons`].
 //!
 //! Inputs: [`Lights`], [`ShadowMaps`], and what says where photons start if they are not spread evenly ([`PhotonSpread`]).
-//! Output: [`Photons`], hop 0. Cost: proportional to the number of photons, one texel fetch each; of photons that are aimed, times
-//! the number of targets. Directions follow the Halton sequence; first hits are looked up in the light's reflective shadow map
-//! (Yao et al. 2010, section 7), or left to the tracer, which traces hop 0 like any other ([`FirstHits`]); it always is for flat
-//! lights, whose photons start anywhere on their surfaces. Limits: photons whose first hits are looked up set out from the middle of
-//! their light, whatever its extent.
+//! Output: [`Photons`], hop 0. Cost: proportional to the number of photons, one texel fetch each; of photons that are aimed,
+//! times the number of targets. Directions follow the Halton sequence; first hits are looked up in the light's reflective
+//! shadow map (Yao et al. 2010, section 7), or left to the tracer, which traces hop 0 like any other ([`FirstHits`]); it always
+//! is for flat lights, whose photons start anywhere on their surfaces. Limits: photons whose first hits are looked up set out
+//! from the middle of their light, whatever its extent.
 
 use super::dispatch_64;
 use super::photon_guiding::Guiding;
@@ -70,8 +70,8 @@ pub enum FirstHits {
     /// In the light's reflective shadow map: a fetch each, exact to within its texels (Yao et al. 2010, section 7).
     #[default]
     ShadowMaps,
-    /// Hop 0 is traced like any other, from anywhere on the sphere of a point light or the disc of a spot, and along any direction
-    /// of a sun's disc.
+    /// Hop 0 is traced like any other, from anywhere on the sphere of a point light or the disc of a spot, and along any
+    /// direction of a sun's disc.
     Traced,
 }
 

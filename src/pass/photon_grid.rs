@@ -1,9 +1,9 @@
 //! Sorts photons into cells of space, so that light can be estimated at any point.
 //!
 //! Input: [`Photons`]. Output: what the passes that estimate light at points of their own read: kernels, sorted by cell. Cost:
-//! proportional to photons. No kernel is wider than a cell, and cells are as wide as the widest kernel that evenly spread photons
-//! have, 64³ at most. Source: Yao et al. 2010, section 6, for kernels; Green 2008 (particles in sorted cells). [`SortedPhotons`]
-//! says which photons count.
+//! proportional to photons. No kernel is wider than a cell, and cells are as wide as the widest kernel that evenly spread
+//! photons have, 64³ at most. Source: Yao et al. 2010, section 6, for kernels; Green 2008 (particles in sorted cells).
+//! [`SortedPhotons`] says which photons count.
 
 use super::photon_splatter::{self, gpu::Bandwidth as BandwidthUniform};
 use super::stable_sort::{Side, SortBuffers, StableSort};

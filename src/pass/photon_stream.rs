@@ -1,12 +1,12 @@
 //! Photons to surface lights: each path replaces the oldest of a pool, whose light is taken back; or a light at each impact.
 //!
-//! Inputs: new [`Photons`], [`SurfaceLights`]. Outputs: their flux, and the [`PhotonPool`]. Source: photon streaming with virtual
-//! surface lights, section 0.5 and Algorithm 2, with changes: an impact counts the flux that its surface sends *on*; the pool
-//! holds whole paths, each of the flux that one of as many emitted at once has, so that its energy is the lights'; fluxes are
-//! whole numbers, so that sums never drift, rounded by chance that belongs to the place in the pool.
-//! A light shines from where that of its impacts arrived that is nearest to its place: places may be hidden, and what no light
-//! reaches should not shine (`docs/surface_lights.md`). [`PhotonStream::record_at_impacts`] is instant radiosity (Keller 1997),
-//! the paper's baseline. For what lights that are discs lose near by one photon of a path is kept ([`PhotonPool::keep_near`]): splatted, it
+//! Inputs: new [`Photons`], [`SurfaceLights`]. Outputs: their flux, and the [`PhotonPool`]. Source: photon streaming with
+//! virtual surface lights, section 0.5 and Algorithm 2, with changes: an impact counts the flux that its surface sends *on*;
+//! the pool holds whole paths, each of the flux that one of as many emitted at once has, so that its energy is the lights';
+//! fluxes are whole numbers, so that sums never drift, rounded by chance that belongs to the place in the pool. A light shines
+//! from where that of its impacts arrived that is nearest to its place: places may be hidden, and what no light reaches should
+//! not shine (`docs/surface_lights.md`). [`PhotonStream::record_at_impacts`] is instant radiosity (Keller 1997), the paper's
+//! baseline. For what lights that are discs lose near by one photon of a path is kept ([`PhotonPool::keep_near`]): splatted, it
 //! brings that back.
 //!
 //! Cost: impacts of the new paths; of each, the cells of the grid around it up to the nearest light; two looks at each impact
@@ -235,8 +235,8 @@ impl PhotonStream {
         Ok(())
     }
 
-    /// Records that some of the paths have become other ones, where the pool holds all photons that there are: nothing else of it
-    /// changes, nor do photons near by, if it keeps them. Follow it with [`PhotonStream::record_places`].
+    /// Records that some of the paths have become other ones, where the pool holds all photons that there are: nothing else of
+    /// it changes, nor do photons near by, if it keeps them. Follow it with [`PhotonStream::record_places`].
     ///
     /// # Errors
     /// [`Error::CountMismatch`] for another number of paths than the pool holds, or of hops; nothing is recorded then.

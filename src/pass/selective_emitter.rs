@@ -1,17 +1,17 @@
 //! Traces anew only the photons whose way has changed.
 //!
-//! Inputs: [`Photons`], traced once as a whole, in [`PhotonGroups`]. Of each group one path is traced in each frame, another one every
-//! time; where it has become another path the group has changed, and all of it is traced anew, those that have changed most first,
-//! as many a frame as a budget allows. Groups of a light that moved have changed. All of it is on the GPU. Source: Larsen 2004,
-//! chapter 9, with changes: groups are what Halton indices leave when divided by 2^a 3^b, and how much of its flux a probe
-//! finds elsewhere says which of them come first.
+//! Inputs: [`Photons`], traced once as a whole, in [`PhotonGroups`]. Of each group one path is traced in each frame, another
+//! one every time; where it has become another path the group has changed, and all of it is traced anew, those that have
+//! changed most first, as many a frame as a budget allows. Groups of a light that moved have changed. All of it is on the GPU.
+//! Source: Larsen 2004, chapter 9, with changes: groups are what Halton indices leave when divided by 2^a 3^b, and how much of
+//! its flux a probe finds elsewhere says which of them come first.
 //!
-//! Order, for each frame: [`SelectiveEmitter::record_probes`]; emission and walk of [`PhotonGroups::probes`] (the `record_listed` of
-//! [`PhotonEmitter`](super::PhotonEmitter) and of a tracer); whatever exchanges the old paths for the new ones elsewhere;
-//! [`SelectiveEmitter::record_choice`]; the same of [`PhotonGroups::chosen`]. Cost: a path for each group, and what has changed. A
-//! change that only some of a group's paths meet is found after as many frames as the group has paths, times the interval, at the latest;
-//! where more changes than the budget allows, what waits gains on what changes again. Limits: lights that take another number of photons, as
-//! when one grows brighter, have all photons traced anew.
+//! Order, for each frame: [`SelectiveEmitter::record_probes`]; emission and walk of [`PhotonGroups::probes`] (the
+//! `record_listed` of [`PhotonEmitter`](super::PhotonEmitter) and of a tracer); whatever exchanges the old paths for the new
+//! ones elsewhere; [`SelectiveEmitter::record_choice`]; the same of [`PhotonGroups::chosen`]. Cost: a path for each group, and
+//! what has changed. A change that only some of a group's paths meet is found after as many frames as the group has paths,
+//! times the interval, at the latest; where more changes than the budget allows, what waits gains on what changes again.
+//! Limits: lights that take another number of photons, as when one grows brighter, have all photons traced anew.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
 use crate::resource::photon_groups::LightsChange;
@@ -70,8 +70,8 @@ pub(crate) const CHOICE_SLOTS: [Slot; 5] = [
 /// Speed against how fast light follows.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SelectiveEmitterSettings {
-    /// Paths traced anew a frame beside probes, of groups that have changed; one group at least, and no more than [`PhotonGroups`] has room
-    /// for.
+    /// Paths traced anew a frame beside probes, of groups that have changed; one group at least, and no more than
+    /// [`PhotonGroups`] has room for.
     pub budget: u32,
     /// Each group is probed once in so many frames, from 1. Higher is cheaper, and finds small changes later.
     pub interval: u32,
@@ -178,9 +178,9 @@ impl SelectiveEmitter {
         }
     }
 
-    /// Records which paths are probed this frame, and what they were. Returns whether they are of use: if not, because the lights
-    /// divide their photons otherwise than before or none are traced yet, nothing was recorded, and all photons are to be traced
-    /// as a whole instead.
+    /// Records which paths are probed this frame, and what they were. Returns whether they are of use: if not, because the
+    /// lights divide their photons otherwise than before or none are traced yet, nothing was recorded, and all photons are to
+    /// be traced as a whole instead.
     pub fn record_probes(
         &self,
         encoder: &mut wgpu::CommandEncoder,

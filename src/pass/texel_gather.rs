@@ -1,14 +1,15 @@
 //! Indirect light at texels of surfaces, gathered again where it has changed.
 //!
 //! Inputs: [`SurfaceLights`], whose changes [`PhotonStream`](super::PhotonStream) has noted; then what a tracer says of the
-//! [`SurfaceRays`] that the first step spreads. Output: [`IlluminationMap`]. Of each surface the indirect light that came and went says
-//! whether its texels are due, the more it is for the surface's area the sooner; as many of them are gathered a frame as a budget
-//! allows. E = π times the mean of L over rays as dense as the cosine, L = Φ / (π A) of the light nearest to where a ray ends, which
-//! holds all light of its surroundings. What is shown goes to what was gathered within a few frames. Source: Larsen 2004, chapters 10
-//! and 11, with changes: photons are added up at texels as they come and go, where the paper searches those nearest to each.
+//! [`SurfaceRays`] that the first step spreads. Output: [`IlluminationMap`]. Of each surface the indirect light that came and
+//! went says whether its texels are due, the more it is for the surface's area the sooner; as many of them are gathered a frame
+//! as a budget allows. E = π times the mean of L over rays as dense as the cosine, L = Φ / (π A) of the light nearest to where
+//! a ray ends, which holds all light of its surroundings. What is shown goes to what was gathered within a few frames. Source:
+//! Larsen 2004, chapters 10 and 11, with changes: photons are added up at texels as they come and go, where the paper searches
+//! those nearest to each.
 //!
-//! Order, for each frame: [`TexelGather::record_rays`], the tracer's `record_surface_rays`, [`TexelGather::record`]. Cost: texels ×
-//! rays, whether anything is due or not; rays of none are over at once.
+//! Order, for each frame: [`TexelGather::record_rays`], the tracer's `record_surface_rays`, [`TexelGather::record`]. Cost:
+//! texels × rays, whether anything is due or not; rays of none are over at once.
 
 use super::dispatch_64;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
@@ -139,8 +140,8 @@ pub struct TexelGatherInputs<'a> {
     pub share: f32,
     /// Of all surfaces, unit frame.
     pub area: f32,
-    /// Room for the rays of as many texels as are gathered a frame; where there is less, fewer are. The first step writes them, a tracer
-    /// says what they meet, the second step reads that.
+    /// Room for the rays of as many texels as are gathered a frame; where there is less, fewer are. The first step writes them,
+    /// a tracer says what they meet, the second step reads that.
     pub rays: &'a SurfaceRays,
     /// Written.
     pub map: &'a mut IlluminationMap,

@@ -1,9 +1,9 @@
 //! Indirect light at pixels, from texels of the surfaces that they see.
 //!
-//! Inputs: [`GBuffer`], [`SurfaceLights`], whose places texels stand at, [`IlluminationMap`]. Output: [`Irradiance`] (`rgba32float`) at
-//! every pixel of the G-buffer or at a part of them; alpha is 1 where a surface is seen, else 0. A plane is laid through the texels
-//! around that face the same way, by moving least squares; where none is near, the nearest counts. Sources: Larsen 2004, chapter
-//! 11, where textures interpolate; moving least squares (Lancaster and Salkauskas 1981).
+//! Inputs: [`GBuffer`], [`SurfaceLights`], whose places texels stand at, [`IlluminationMap`]. Output: [`Irradiance`]
+//! (`rgba32float`) at every pixel of the G-buffer or at a part of them; alpha is 1 where a surface is seen, else 0. A plane is
+//! laid through the texels around that face the same way, by moving least squares; where none is near, the nearest counts.
+//! Sources: Larsen 2004, chapter 11, where textures interpolate; moving least squares (Lancaster and Salkauskas 1981).
 //!
 //! Cost: pixels × texels within reach. Limits: what is finer than texels lie apart is lost, contact shadows among it.
 
@@ -66,7 +66,8 @@ pub struct TexelShadingInputs<'a> {
     pub lights: &'a SurfaceLights,
     /// Their light.
     pub map: &'a IlluminationMap,
-    /// How far texels count, in times that they lie apart, above 0: 1.5 is a good value. More is smoother, and costs as the square.
+    /// How far texels count, in times that they lie apart, above 0: 1.5 is a good value. More is smoother, and costs as the
+    /// square.
     pub reach: f32,
     /// Written; `rgba32float`, of the size that [`Subsampling::size`] makes of the G-buffer's.
     pub irradiance: &'a Irradiance,

@@ -3,8 +3,8 @@
 use super::{PathList, SurfaceLights};
 use crate::{Error, gpu as device};
 
-/// Irradiance at texels: of each light of [`SurfaceLights`] that of the side of the surface that it stands on, in their order. Gathered by
-/// [`TexelGather`](crate::pass::TexelGather) where it has changed, a few texels a frame; shown by
+/// Irradiance at texels: of each light of [`SurfaceLights`] that of the side of the surface that it stands on, in their order.
+/// Gathered by [`TexelGather`](crate::pass::TexelGather) where it has changed, a few texels a frame; shown by
 /// [`TexelShading`](crate::pass::TexelShading), or by a host whose places are the texels of its own light map.
 #[derive(Debug)]
 pub struct IlluminationMap {
@@ -63,8 +63,8 @@ impl IlluminationMap {
         }
     }
 
-    /// Irradiance that is shown, of each texel RGB in the unit frame, and alpha: which share of its rays did not meet
-    /// backs of surfaces, but 2^-10 at least; 0 before it was gathered. Four `f32`. Texels whose alpha is below a half stand inside of
+    /// Irradiance that is shown, of each texel RGB in the unit frame, and alpha: which share of its rays did not meet backs of
+    /// surfaces, but 2^-10 at least; 0 before it was gathered. Four `f32`. Texels whose alpha is below a half stand inside of
     /// something, and do not count.
     pub fn shown(&self) -> &wgpu::Buffer {
         &self.shown

@@ -22,8 +22,8 @@ const HEADER_BYTES: u64 = std::mem::offset_of!(gpu::PathList, paths) as u64;
 /// Paths that a shader lists together. Twin of `BLOCK` in `shaders/pass/image_space_tracer/list_lost.wgsl`.
 pub(crate) const BLOCK: u32 = 64;
 
-/// A list of paths on the GPU: those whose hop a tracer lost or is not sure of, in ascending order; or those that are traced anew
-/// ([`PhotonGroups`](super::PhotonGroups)). It is the same every time.
+/// A list of paths on the GPU: those whose hop a tracer lost or is not sure of, in ascending order; or those that are traced
+/// anew ([`PhotonGroups`](super::PhotonGroups)). It is the same every time.
 ///
 /// A storage buffer, also `COPY_SRC` and `COPY_DST`: the three workgroup counts of an indirect dispatch with an invocation
 /// for each path in workgroups of 64, none above 65 535; how many paths there are; their numbers. All `u32`.

@@ -41,8 +41,8 @@ const PARTS: [[u32; 2]; 15] = [
 /// The last of these numbers.
 const MOST_PARTS: u32 = 62_208;
 
-/// Paths of [`Photons`] in groups (Larsen 2004, section 9.1): of each light, those whose index leaves the same when divided by 2^a 3^b
-/// start in the same part of its directions. With what is known of each group and of the paths that are traced anew.
+/// Paths of [`Photons`] in groups (Larsen 2004, section 9.1): of each light, those whose index leaves the same when divided by
+/// 2^a 3^b start in the same part of its directions. With what is known of each group and of the paths that are traced anew.
 #[derive(Debug)]
 pub struct PhotonGroups {
     grouped: wgpu::Buffer,
@@ -69,8 +69,8 @@ pub(crate) enum LightsChange {
 }
 
 impl PhotonGroups {
-    /// For all paths of `photons`, some `per_group` in each (40 in the paper), of which up to `budget` are traced anew at once: at
-    /// least as many as a group has. Bytes: 4 a group, 48 a hop of each probe.
+    /// For all paths of `photons`, some `per_group` in each (40 in the paper), of which up to `budget` are traced anew at once:
+    /// at least as many as a group has. Bytes: 4 a group, 48 a hop of each probe.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`].
@@ -169,7 +169,8 @@ impl PhotonGroups {
         &self.chosen
     }
 
-    /// What the probes were before they were traced anew: slot hop × [`PhotonGroups::kept_count`] + place in the list, 48 bytes each.
+    /// What the probes were before they were traced anew: slot hop × [`PhotonGroups::kept_count`] + place in the list, 48 bytes
+    /// each.
     pub fn kept(&self) -> &wgpu::Buffer {
         &self.kept
     }
@@ -179,8 +180,8 @@ impl PhotonGroups {
         self.kept_count
     }
 
-    /// Four `u32` of the last frame: paths probed, those that had become other ones, paths chosen to be traced anew, groups that
-    /// wait.
+    /// Four `u32` of the last frame: paths probed, those that had become other ones, paths chosen to be traced anew, groups
+    /// that wait.
     pub fn counts(&self) -> &wgpu::Buffer {
         &self.counts
     }

@@ -64,9 +64,10 @@ impl PhotonPool {
         })
     }
 
-    /// Keeps of each path one of the photons that came a short way at most, from now on, 48 bytes each: for what lights that are discs
-    /// ([`LightShape::Disc`](crate::pass::LightShape::Disc)) lose near by. The photons that are streamed have one hop more then, whose
-    /// light ends there. Unlike impacts these do not move along with what they lie on, but are replaced with their paths.
+    /// Keeps of each path one of the photons that came a short way at most, from now on, 48 bytes each: for what lights that
+    /// are discs ([`LightShape::Disc`](crate::pass::LightShape::Disc)) lose near by. The photons that are streamed have one hop
+    /// more then, whose light ends there. Unlike impacts these do not move along with what they lie on, but are replaced with
+    /// their paths.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`].
@@ -76,8 +77,8 @@ impl PhotonPool {
         Ok(())
     }
 
-    /// Has lights note what comes and goes from now on ([`SurfaceLights::changes`](super::SurfaceLights::changes)): the last hop for
-    /// that alone, for whoever asks what has changed is lit by the hops before.
+    /// Has lights note what comes and goes from now on ([`SurfaceLights::changes`](super::SurfaceLights::changes)): the last
+    /// hop for that alone, for whoever asks what has changed is lit by the hops before.
     pub fn note_changes(&mut self) {
         self.notes_changes = true;
     }
@@ -95,9 +96,8 @@ impl PhotonPool {
         self.is_stale
     }
 
-    /// What lights that are discs lose near by, one photon a path or none, for
-    /// [`PhotonSplatter`](crate::pass::PhotonSplatter); its irradiance is to be divided by [`PhotonPool::share`], too. `None` unless it is
-    /// kept.
+    /// What lights that are discs lose near by, one photon a path or none, for [`PhotonSplatter`](crate::pass::PhotonSplatter);
+    /// its irradiance is to be divided by [`PhotonPool::share`], too. `None` unless it is kept.
     pub fn near(&self) -> Option<&Photons> {
         self.near.as_ref()
     }

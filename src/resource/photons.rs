@@ -13,9 +13,9 @@ pub const PHOTON_BYTES: u64 = size_of::<Photon>() as u64;
 pub struct Photon {
     /// Where the hop ended, unit frame.
     pub position: [f32; 3],
-    /// Low two bits: a [`PhotonState`]. Bits 2 to 7: bits 0 to 5 of the surface's lobe, 0 if it is diffuse. Bit 8: the path came
-    /// straight from its light. Bit 9: the tracer is not sure of the hop. Bit 10: the hop begins here, at its light, and is
-    /// still to be traced; `position`, `normal` and `direction` are those of its start. Bit 11: the surface's back is hit.
+    /// Low two bits: a [`PhotonState`]. Bits 2 to 7: bits 0 to 5 of the surface's lobe, 0 if it is diffuse. Bit 8: the path
+    /// came straight from its light. Bit 9: the tracer is not sure of the hop. Bit 10: the hop begins here, at its light, and
+    /// is still to be traced; `position`, `normal` and `direction` are those of its start. Bit 11: the surface's back is hit.
     /// Bit 12: it came by way of metal and glass alone, in a [`PhotonMap::Global`]. Bit 13, beside bit 10: the light's rays are
     /// parallel. Bit 14, beside bit 8 or 10: the light is flat. Bits 15 to 31 are 0 where no photons are guided and after the
     /// path's end, else (see [`GuidingTables`](super::GuidingTables)): bit 15, this one is; bits 16 to 23, the cell that it
@@ -34,9 +34,9 @@ pub struct Photon {
     pub direction: u32,
     /// Reflectance of the surface, 11-11-10.
     pub reflectance: u32,
-    /// Bits 0 to 7: index of the light that the path began at, in [`Lights`](super::Lights). Bits 8 to 15:
-    /// bits 6 to 13 of the surface's lobe. Bits 16 to 31: [`Instance::surface`](crate::scene::Instance::surface) of what was hit, 0
-    /// where it has none.
+    /// Bits 0 to 7: index of the light that the path began at, in [`Lights`](super::Lights). Bits 8 to 15: bits 6 to 13 of the
+    /// surface's lobe. Bits 16 to 31: [`Instance::surface`](crate::scene::Instance::surface) of what was hit, 0 where it has
+    /// none.
     pub light_and_surface: u32,
 }
 
@@ -156,8 +156,8 @@ pub enum PhotonMap {
     Caustic,
 }
 
-/// Photon records of `count` paths of up to `bounces` scatterings: slot `b` × `count` + `i` is hop `b` of path `i`.
-/// Hop 0 ends at the first surface that light from the source meets; of what [`PhotonPool::near`](super::PhotonPool::near) holds, at any.
+/// Photon records of `count` paths of up to `bounces` scatterings: slot `b` × `count` + `i` is hop `b` of path `i`. Hop 0 ends
+/// at the first surface that light from the source meets; of what [`PhotonPool::near`](super::PhotonPool::near) holds, at any.
 #[derive(Debug)]
 pub struct Photons {
     buffer: wgpu::Buffer,

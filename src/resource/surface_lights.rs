@@ -42,9 +42,10 @@ pub(crate) mod gpu {
 }
 
 /// Lights on surfaces, two at each place, one for either side: light 2 i on the side that its normal points to. Storage
-/// buffers: 32 bytes a light (position, area, normal, number of its surface and side; unit frame), where it stands and where it shines from, and its flux,
-/// red, green and blue as whole numbers of [`SurfaceLights::flux_of_step`], with the number of photons that it is of. Filled by
-/// [`PhotonStream`](crate::pass::PhotonStream), shone by [`SurfaceLightShading`](crate::pass::SurfaceLightShading).
+/// buffers: 32 bytes a light (position, area, normal, number of its surface and side; unit frame), where it stands and where it
+/// shines from, and its flux, red, green and blue as whole numbers of [`SurfaceLights::flux_of_step`], with the number of
+/// photons that it is of. Filled by [`PhotonStream`](crate::pass::PhotonStream), shone by
+/// [`SurfaceLightShading`](crate::pass::SurfaceLightShading).
 #[derive(Debug)]
 pub struct SurfaceLights {
     /// Where they stand.
@@ -109,7 +110,8 @@ impl SurfaceLights {
     /// # Errors
     /// [`Error::CountMismatch`] for more places than there is room for; [`Error::InvalidScene`] for one that is not finite.
     ///
-    /// Returns whether any moved: then they shine from their places until [`PhotonStream`](crate::pass::PhotonStream) is recorded.
+    /// Returns whether any moved: then they shine from their places until [`PhotonStream`](crate::pass::PhotonStream) is
+    /// recorded.
     pub fn write(&mut self, queue: &wgpu::Queue, frame: &UnitFrame, places: &[SurfacePlace]) -> Result<bool, Error> {
         if lights_of(places.len() as u32) > self.capacity {
             return Err(Error::CountMismatch {
@@ -194,8 +196,8 @@ impl SurfaceLights {
     }
 
     /// Of the lights, two `u32` each: the flux that came and went where a pool notes that
-    /// ([`PhotonPool::note_changes`](super::PhotonPool::note_changes)), sums over channels in 16 steps, and of that the part that had been scattered before
-    /// it arrived; until whoever uses it sets it to 0.
+    /// ([`PhotonPool::note_changes`](super::PhotonPool::note_changes)), sums over channels in 16 steps, and of that the part
+    /// that had been scattered before it arrived; until whoever uses it sets it to 0.
     pub fn changes(&self) -> &wgpu::Buffer {
         &self.changes
     }

@@ -9,8 +9,8 @@ use std::collections::{BinaryHeap, HashMap};
 /// Corners that lie nearer to each other than this share of a mesh's extent are one.
 const WELD: f64 = 1e-6;
 
-/// Which surface each triangle of a mesh is part of: triangles that share an edge are on the same one, unless it is sharp (Larsen 2004,
-/// chapter 8, where surfaces are divided by hand).
+/// Which surface each triangle of a mesh is part of: triangles that share an edge are on the same one, unless it is sharp
+/// (Larsen 2004, chapter 8, where surfaces are divided by hand).
 #[derive(Debug, Clone, PartialEq)]
 pub struct SurfacePartition {
     /// Of each triangle, from 0.
@@ -22,8 +22,9 @@ impl SurfacePartition {
     /// Angle between the normals of triangles, radians, from which on the edge between them is sharp: the crease angle of VRML.
     pub const CREASE: f64 = 0.5;
 
-    /// Divides a mesh at edges sharper than `crease`, radians: corners at the same place are one, so that texture seams and flat shading
-    /// divide nothing. `linear` is what the mesh is shown under, for areas. Takes time in proportion to the triangles.
+    /// Divides a mesh at edges sharper than `crease`, radians: corners at the same place are one, so that texture seams and
+    /// flat shading divide nothing. `linear` is what the mesh is shown under, for areas. Takes time in proportion to the
+    /// triangles.
     pub fn of(mesh: &Mesh, linear: &DMat3, crease: f64) -> Self {
         let edges = Edges::of(mesh, linear);
         let mut sets = DisjointSets::new(edges.normals.len());
@@ -36,9 +37,10 @@ impl SurfacePartition {
         Self::new(sets, &edges.areas)
     }
 
-    /// The same, but that surfaces of less than `least_area`, world units squared, are joined to a neighbour, the smallest first, until they are
-    /// as large or have none: a mesh of small sharp triangles is one surface, whose parts then go by their normals. With
-    /// `least_area` as the area that 50 photons are expected on, estimates from the photons of one surface are of enough of them.
+    /// The same, but that surfaces of less than `least_area`, world units squared, are joined to a neighbour, the smallest
+    /// first, until they are as large or have none: a mesh of small sharp triangles is one surface, whose parts then go by
+    /// their normals. With `least_area` as the area that 50 photons are expected on, estimates from the photons of one surface
+    /// are of enough of them.
     pub fn merged(mesh: &Mesh, linear: &DMat3, crease: f64, least_area: f64) -> Self {
         let fine = Self::of(mesh, linear, crease);
         let edges = Edges::of(mesh, linear);
@@ -153,9 +155,10 @@ impl SurfacePartition {
         parts.into_iter().map(part).collect()
     }
 
-    /// A scene whose instances are surfaces, with numbers ([`Instance::surface`](super::Instance::surface)) from 1: then photons keep to the surface
-    /// that they arrive at, where passes are told so. Surfaces that fewer than 50 of `photons` photons are expected on, if these were
-    /// spread evenly, are joined to a neighbour. What shines stays as it is, for its triangles are one lamp.
+    /// A scene whose instances are surfaces, with numbers ([`Instance::surface`](super::Instance::surface)) from 1: then
+    /// photons keep to the surface that they arrive at, where passes are told so. Surfaces that fewer than 50 of `photons`
+    /// photons are expected on, if these were spread evenly, are joined to a neighbour. What shines stays as it is, for its
+    /// triangles are one lamp.
     ///
     /// # Errors
     /// [`Error::CountMismatch`] for more than 65 535 surfaces: take fewer photons, or a wider crease.

@@ -187,8 +187,8 @@ impl<'a> SampledInstance<'a> {
     }
 }
 
-/// How much surface lies nearer to each point than to any other that faces the same way, as surface lights see it: from a number of
-/// samples for each point, spread by area.
+/// How much surface lies nearer to each point than to any other that faces the same way, as surface lights see it: from a
+/// number of samples for each point, spread by area.
 fn cell_areas(instances: &[SampledInstance<'_>], placed: &[Placed]) -> Vec<f64> {
     let total: f64 = instances.iter().map(|i| i.area).sum();
     let mut areas = vec![0.0; placed.len()];
@@ -229,8 +229,8 @@ impl Cells {
         Self { side, points }
     }
 
-    /// The point that is nearest to a place and faces the same way on one of its sides, distances off the place's plane counted as
-    /// surface lights do; where none does, the nearest that faces least apart.
+    /// The point that is nearest to a place and faces the same way on one of its sides, distances off the place's plane counted
+    /// as surface lights do; where none does, the nearest that faces least apart.
     fn nearest(&self, placed: &[Placed], own: &SurfacePlace) -> usize {
         let cost = |&point: &usize| {
             let away = placed[point].place.position - own.position;

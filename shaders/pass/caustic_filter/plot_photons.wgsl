@@ -1,5 +1,5 @@
-// Photons as points of the screen (Larsen 2004, section 12.1): each adds its flux to the pixel that sees where it arrived, and lists
-// the tiles that the filter spreads it over. Sums are whole numbers: their order does not matter.
+// Photons as points of the screen (Larsen 2004, section 12.1): each adds its flux to the pixel that sees where it arrived, and
+// lists the tiles that the filter spreads it over. Sums are whole numbers: their order does not matter.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> view: View;
@@ -23,7 +23,8 @@ struct TileList {
 
 // Workgroups in a row of that dispatch.
 const TILE_ROW: u32 = 256u;
-// Pixels off the plane that a pixel sees up to which a photon lies on it, and cosine of the largest angle between their normals.
+// Pixels off the plane that a pixel sees up to which a photon lies on it, and cosine of the largest angle between their
+// normals.
 const OFF_PLANE: f32 = 2.0;
 const SAME_WAY: f32 = 0.5;
 

@@ -33,8 +33,8 @@ fn light_of(photon: u32) -> u32 {
     return index;
 }
 
-// `boost`: how many times as many photons start this way as would if they were spread evenly; `kept`: bits of the state that say
-// so.
+// `boost`: how many times as many photons start this way as would if they were spread evenly; `kept`: bits of the state that
+// say so.
 fn emit_photon(index: u32, u: vec2f, boost: f32, kept: u32) {
     let light_index = light_of(index);
     let light = lights[light_index];

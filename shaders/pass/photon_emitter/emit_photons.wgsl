@@ -11,8 +11,8 @@ fn emit_photons(@builtin(global_invocation_id) id: vec3u) {
     }
 }
 
-// The first of each light's, a share of them rounded by chance, as the tables say: both parts of the sequence are as evenly spread
-// as the whole.
+// The first of each light's, a share of them rounded by chance, as the tables say: both parts of the sequence are as evenly
+// spread as the whole.
 @compute @workgroup_size(64)
 fn emit_guided_photons(@builtin(global_invocation_id) id: vec3u) {
     let index = id.y * params.row + id.x;

@@ -1,6 +1,6 @@
-// Of each new path the photon that is kept for what discs lose near by, or none. A disc of area A gives pi r^2 / (pi r^2 + A) of what
-// its points do at the distance r: a photon that came so far is kept by the chance of the rest. What comes by way of metal
-// or glass no light brings: all of it is kept.
+// Of each new path the photon that is kept for what discs lose near by, or none. A disc of area A gives pi r^2 / (pi r^2 + A)
+// of what its points do at the distance r: a photon that came so far is kept by the chance of the rest. What comes by way of
+// metal or glass no light brings: all of it is kept.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> photons: array<Photon>;

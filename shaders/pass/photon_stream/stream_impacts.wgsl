@@ -1,6 +1,6 @@
-// New paths replace the oldest of the pool, or some of its paths are replaced by what has become of them: what was sent on is taken from
-// the lights, and what is goes to the lights nearest to where it arrived. All of it is whole numbers, so that a light holds the sum
-// of the impacts that point to it, exactly and for good.
+// New paths replace the oldest of the pool, or some of its paths are replaced by what has become of them: what was sent on is
+// taken from the lights, and what is goes to the lights nearest to where it arrived. All of it is whole numbers, so that a
+// light holds the sum of the impacts that point to it, exactly and for good.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> grid: SurfaceLightGrid;

@@ -1,5 +1,5 @@
-// Texels of surfaces whose indirect light has changed by more than a threshold are due, the more so the more it has changed for their
-// area. What has changed less is kept, and adds up.
+// Texels of surfaces whose indirect light has changed by more than a threshold are due, the more so the more it has changed for
+// their area. What has changed less is kept, and adds up.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<storage, read> lights: array<SurfaceLight>;

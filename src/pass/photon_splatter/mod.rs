@@ -1,10 +1,10 @@
 //! Density estimation: irradiance at each pixel from the photons around the surface point it sees.
 //!
-//! Inputs: [`Photons`], [`GBuffer`]. Output: [`Irradiance`] (`rgba32float`), at every pixel of the G-buffer, at a part of
-//! them ([`Subsampling`]), or anew at [`MarkedPixels`]; alpha is 1 where a surface is seen, else 0. E(x) = Σ Φ K(|x − x_p| / h) / h², K normalised over
-//! the unit disc; photons straight from a light are left out, for direct light is shaded by itself. Sources: Yao et al. 2010,
-//! section 6; Yao et al., soft shadows and image-space photon mapping, section 3.3; Mara et al. 2013 (tiles); Knaus and
-//! Zwicker 2011 ([`progressive_scale`]).
+//! Inputs: [`Photons`], [`GBuffer`]. Output: [`Irradiance`] (`rgba32float`), at every pixel of the G-buffer, at a part of them
+//! ([`Subsampling`]), or anew at [`MarkedPixels`]; alpha is 1 where a surface is seen, else 0. E(x) = Σ Φ K(|x − x_p| / h) /
+//! h², K normalised over the unit disc; photons straight from a light are left out, for direct light is shaded by itself.
+//! Sources: Yao et al. 2010, section 6; Yao et al., soft shadows and image-space photon mapping, section 3.3; Mara et al. 2013
+//! (tiles); Knaus and Zwicker 2011 ([`progressive_scale`]).
 //!
 //! Cost of the tiled shape: photons sorted, then pixels × photons in the bins that a kernel may reach. Limits: kernels are
 //! at most `max_radius` pixels wide; what hangs over a rim is made up for where the image shows the rim.
@@ -186,13 +186,14 @@ impl PhotonSplatterConfig {
 pub struct PhotonSplatterSettings {
     /// Kernel radius.
     pub bandwidth: Bandwidth,
-    /// Narrowest kernel radius in pixels of the irradiance, 0 or more, before `radius_scale`: a kernel between pixels is seen by
-    /// none of them.
+    /// Narrowest kernel radius in pixels of the irradiance, 0 or more, before `radius_scale`: a kernel between pixels is seen
+    /// by none of them.
     pub min_radius: f32,
     /// Widest kernel radius in pixels of the irradiance, up to 23: bounds the cost of a photon near the eye. Where
     /// irradiance is sub-sampled, kernels may thus be wider by the factor.
     pub max_radius: f32,
-    /// Factor on the radius and on `min_radius`, before `max_radius`: [`progressive_scale`] of the frame where frames are accumulated, else 1.
+    /// Factor on the radius and on `min_radius`, before `max_radius`: [`progressive_scale`] of the frame where frames are
+    /// accumulated, else 1.
     pub radius_scale: f32,
     /// What is done at rims.
     pub boundary: BoundaryCorrection,
