@@ -94,12 +94,8 @@ fn bad_input_gets_one_line_status_two_and_no_file() {
             "image-space, bvh or hybrid",
         ),
         (
-            &["sample:cornell", "--method", "illumination-maps"],
-            "not available yet",
-        ),
-        (
-            &["sample:cornell", "--method", "illumination-maps"],
-            "not available yet",
+            &["sample:cornell", "--set", "illumination_maps.blend=0"],
+            "above 0, at most 1",
         ),
         (&["sample:cornell", "--budget-ms", "4"], "not available yet"),
     ];
@@ -208,7 +204,7 @@ fn images_and_statistics_are_written_whole() {
         .map(|v| v.as_u64().unwrap())
         .sum();
     assert_eq!(bytes["total"].as_u64().unwrap(), sum);
-    assert_eq!(stats["plan"].as_array().unwrap().len(), 26);
+    assert_eq!(stats["plan"].as_array().unwrap().len(), 28);
     // Of a scene in motion, with a lamp that casts penumbrae.
     render_to_penumbra(&path("p.json"));
     let stats: serde_json::Value = serde_json::from_slice(&std::fs::read(path("p.json")).unwrap()).unwrap();
