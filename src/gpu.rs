@@ -422,6 +422,28 @@ pub(crate) struct ComputeSpec<'a> {
     pub(crate) constants: &'a [(&'a str, f64)],
 }
 
+/// A compute shader of one entry point, with a layout of its own as group 0.
+#[derive(Debug)]
+pub(crate) struct Step {
+    pub(crate) layout: wgpu::BindGroupLayout,
+    pub(crate) pipeline: wgpu::ComputePipeline,
+}
+
+impl Step {
+    /// `spec` without layouts.
+    pub(crate) fn new(device: &wgpu::Device, slots: &[Slot], spec: &ComputeSpec<'_>) -> Self {
+        let layout = layout(device, spec.label, wgpu::ShaderStages::COMPUTE, slots);
+        let pipeline = compute_pipeline(
+            device,
+            &ComputeSpec {
+                layouts: &[&layout],
+                ..*spec
+            },
+        );
+        Self { layout, pipeline }
+    }
+}
+
 pub(crate) fn compute_pipeline(device: &wgpu::Device, spec: &ComputeSpec<'_>) -> wgpu::ComputePipeline {
     count(|c| c.pipelines += 1);
     device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {

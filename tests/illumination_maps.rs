@@ -3,11 +3,12 @@
 
 mod common;
 
+use common::rooms::{block_at, bulb, move_block, with_blocks as rooms};
 use common::{Component, Gpu, Offline, Reference, assert_no_errors, gpu};
 use lightfall::frame::{IndirectMethod, Settings};
-use lightfall::glam::{DAffine3, DVec3, Vec3};
+use lightfall::glam::Vec3;
 use lightfall::reference::{PathComponent, PathTracerSettings};
-use lightfall::scene::{Instance, Light, LightKind, Scene, samples};
+use lightfall::scene::{Scene, samples};
 use lightfall::{Error, read_buffer_blocking};
 
 const SIZE: [u32; 2] = [64, 48];
@@ -35,34 +36,6 @@ fn offline<'a>(gpu: &'a Gpu, scene: &Scene, settings: &Settings) -> Offline<'a> 
     let mut offline = Offline::new(gpu, scene.clone(), settings, 0, SIZE, Component::Indirect).unwrap();
     offline.render_frame(None).unwrap();
     offline
-}
-
-/// Two rooms with a bulb and a block in each, and a door between them, which is closed at 0 and open at 1.
-fn rooms(time: f64) -> Scene {
-    let mut scene = samples::two_rooms(time);
-    let LightKind::Point { position, .. } = scene.lights[0].kind else {
-        panic!("the sample's light is a bulb");
-    };
-    let far = DVec3::new(position.x, position.y, -position.z);
-    scene.lights.push(Light::point(far, 20.0, [1.0, 0.9, 0.75]));
-    let door = scene.instances.iter().find(|i| i.name == "door").unwrap().clone();
-    for (name, z) in [("near block", -2.5), ("far block", 2.5)] {
-        scene.instances.push(Instance {
-            name: name.into(),
-            transform: block_at(0.5, z),
-            ..door.clone()
-        });
-    }
-    scene
-}
-
-fn block_at(x: f64, z: f64) -> DAffine3 {
-    DAffine3::from_translation(DVec3::new(x, 0.0, z)) * DAffine3::from_scale(DVec3::new(0.5, 0.25, 3.0))
-}
-
-fn move_block(scene: &mut Scene, name: &str, transform: DAffine3) {
-    let block = scene.instances.iter_mut().find(|i| i.name == name);
-    block.unwrap().transform = transform;
 }
 
 /// Of each texel where it stands, and the light that was gathered there.
@@ -162,7 +135,7 @@ fn behind_a_closed_door_no_texel_is_gathered_again_and_through_an_open_one_some_
         let mut offline = offline(&gpu, &scene, &settings);
         offline.render_frame(None).unwrap();
         let before = texels(&gpu, &offline);
-        move_block(&mut scene, "near block", block_at(-0.5, -1.5));
+        move_block(&mut scene, "near block", block_at(-0.5, -1.5, 0.5));
         offline.set_scene(scene).unwrap();
         let mut gathered = 0;
         for _ in 0..offline.renderer.photon_groups().unwrap().largest() {
@@ -233,10 +206,7 @@ fn after_a_change_the_light_is_that_of_a_fresh_start_and_a_blend_takes_its_jumps
 
 fn move_bulb(scene: &mut Scene) {
     // Of the room that the eye is in.
-    let LightKind::Point { position, .. } = &mut scene.lights[1].kind else {
-        panic!("a bulb");
-    };
-    position.x += 1.2;
+    bulb(scene, 1).x += 1.2;
 }
 
 #[test]
@@ -256,7 +226,7 @@ fn small_changes_wait_until_they_add_up() {
     };
     let first = changes(&offline);
     assert!(first > 0);
-    move_block(&mut scene, "near block", block_at(-0.5, -1.5));
+    move_block(&mut scene, "near block", block_at(-0.5, -1.5, 0.5));
     offline.set_scene(scene).unwrap();
     offline.render_frame(None).unwrap();
     assert!(changes(&offline) > first);

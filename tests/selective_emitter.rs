@@ -2,41 +2,12 @@
 
 mod common;
 
+use common::rooms::{block_at, bulb, move_block, with_blocks as rooms};
 use common::{Component, Gpu, Offline, assert_no_errors, gpu};
 use lightfall::frame::Settings;
-use lightfall::glam::{DAffine3, DVec3};
 use lightfall::read_buffer_blocking;
 use lightfall::resource::Photon;
-use lightfall::scene::{Instance, Light, LightKind, Scene, samples};
-
-/// Two rooms with a bulb and a block in each, and a door between them, which is closed at 0 and open at 1.
-fn rooms(time: f64) -> Scene {
-    let mut scene = samples::two_rooms(time);
-    let LightKind::Point { position, .. } = scene.lights[0].kind else {
-        panic!("the sample's light is a bulb");
-    };
-    let far = DVec3::new(position.x, position.y, -position.z);
-    scene.lights.push(Light::point(far, 20.0, [1.0, 0.9, 0.75]));
-    let door = scene.instances.iter().find(|i| i.name == "door").unwrap().clone();
-    for (name, z) in [("near block", -2.5), ("far block", 2.5)] {
-        scene.instances.push(Instance {
-            name: name.into(),
-            transform: block_at(0.5, z, 0.5),
-            ..door.clone()
-        });
-    }
-    scene
-}
-
-/// A block of this size in one of the rooms.
-fn block_at(x: f64, z: f64, size: f64) -> DAffine3 {
-    DAffine3::from_translation(DVec3::new(x, 0.0, z)) * DAffine3::from_scale(DVec3::new(size, 0.5 * size, 6.0 * size))
-}
-
-fn move_block(scene: &mut Scene, name: &str, transform: DAffine3) {
-    let block = scene.instances.iter_mut().find(|i| i.name == name);
-    block.unwrap().transform = transform;
-}
+use lightfall::scene::Scene;
 
 fn settings(overrides: &[(&str, &str)]) -> Settings {
     let mut settings = Settings {
@@ -182,10 +153,7 @@ fn photons_of_a_light_that_moves_are_traced_anew_within_the_budget_and_no_others
     let mut scene = rooms(0.0);
     let mut offline = offline(&gpu, &scene, &settings);
     let half = 6000;
-    let LightKind::Point { position, .. } = &mut scene.lights[0].kind else {
-        panic!("the sample's light is a bulb");
-    };
-    position.x += 0.5;
+    bulb(&mut scene, 0).x += 0.5;
     offline.set_scene(scene.clone()).unwrap();
     let mut numbers = Vec::new();
     for _ in 0..6 {

@@ -7,7 +7,7 @@ use lightfall::frame::{IndirectMethod, LightPlacement, PhotonFeeder, Settings};
 use lightfall::glam::{DVec3, Vec3};
 use lightfall::pass::*;
 use lightfall::resource::*;
-use lightfall::scene::{Light, LightKind, Scene, SceneBounds, SurfacePlace, UnitFrame, samples};
+use lightfall::scene::{LightKind, Scene, SceneBounds, SurfacePlace, UnitFrame, samples};
 use lightfall::{Error, creation_count, read_buffer_blocking, wgpu};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -574,12 +574,7 @@ fn rays_to_all_lights_keep_them_behind_walls_and_rays_to_some_agree_in_the_mean(
 fn what_a_moving_light_hardly_reaches_is_as_steady_as_splatted() {
     let Some(gpu) = gpu() else { return };
     // A bulb in each of two rooms, the door between them closed; that of the room behind moves for 300 frames.
-    let mut scene = samples::two_rooms(0.0);
-    let LightKind::Point { position, .. } = scene.lights[0].kind else {
-        panic!("the sample's light is a bulb");
-    };
-    let far = DVec3::new(position.x, position.y, -position.z);
-    scene.lights.push(Light::point(far, 20.0, [1.0, 0.9, 0.75]));
+    let scene = common::rooms::with_bulbs(0.0);
     // Largest change of a picture from the first, over its mean.
     let change = |settings: &Settings| {
         let mut scene = scene.clone();
@@ -589,10 +584,7 @@ fn what_a_moving_light_hardly_reaches_is_as_steady_as_splatted() {
         assert!(mean(&first) > 0.01);
         let mut most = 0f64;
         for frame in 0..300 {
-            let LightKind::Point { position, .. } = &mut scene.lights[0].kind else {
-                unreachable!("the same bulb");
-            };
-            position.x = -0.8 + 0.6 * (0.02 * PI * f64::from(frame)).sin();
+            common::rooms::bulb(&mut scene, 0).x = -0.8 + 0.6 * (0.02 * PI * f64::from(frame)).sin();
             offline.set_scene(scene.clone()).unwrap();
             offline.render_frame(None).unwrap();
             if frame % 10 == 9 {

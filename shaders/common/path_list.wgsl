@@ -7,6 +7,11 @@ struct PathList {
     paths: array<u32>,
 }
 
+// The place in a list of so many workgroups in a row that an invocation of its dispatch takes.
+fn path_list_place(id: vec3u, workgroups: u32) -> u32 {
+    return id.y * (workgroups * 64u) + id.x;
+}
+
 // Workgroups for `count` invocations of 64, none above 65535 along an axis.
 fn path_list_workgroups(count: u32) -> array<u32, 3> {
     let groups = count / 64u + u32(count % 64u > 0u);

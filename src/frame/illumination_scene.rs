@@ -89,6 +89,7 @@ impl IlluminationScene {
             return traced.record_all(encoder, passes, inputs);
         }
         let (lights, pool, own) = (&self.lights, &mut self.pool, &mut self.stream);
+        let mut is_part = false;
         traced.record_selected(encoder, passes, inputs, &mut |encoder, photons, retraced| {
             let mut stream_inputs = PhotonStreamInputs {
                 queue: scene.queue,
@@ -99,7 +100,10 @@ impl IlluminationScene {
             };
             match retraced {
                 Retraced::All => stream.record(encoder, own, &mut stream_inputs),
-                Retraced::Listed(list) => stream.record_listed(encoder, own, &stream_inputs, list),
+                Retraced::Listed(list) => {
+                    is_part = true;
+                    stream.record_listed(encoder, own, &stream_inputs, list)
+                }
             }
         })?;
         let stream_inputs = PhotonStreamInputs {
@@ -109,7 +113,10 @@ impl IlluminationScene {
             lights: &self.lights,
             timestamps: scene.timestamps,
         };
-        stream.record_places(encoder, &mut self.stream, &stream_inputs);
+        // All photons bring it along.
+        if is_part {
+            stream.record_places(encoder, &mut self.stream, &stream_inputs);
+        }
         let mut gather_inputs = TexelGatherInputs {
             queue: scene.queue,
             lights: &self.lights,

@@ -11,7 +11,7 @@
 //! wider than 15; photons hidden behind what the pixel sees are lost.
 
 use super::dispatch_64;
-use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
+use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot, Step};
 use crate::resource::{GBuffer, Irradiance, Photons};
 use crate::{Error, Timestamps, wgsl};
 
@@ -100,10 +100,8 @@ impl Default for CausticFilterSettings {
 #[derive(Debug)]
 pub struct CausticFilter {
     device: wgpu::Device,
-    plot_layout: wgpu::BindGroupLayout,
-    filter_layout: wgpu::BindGroupLayout,
-    plot: wgpu::ComputePipeline,
-    filter: wgpu::ComputePipeline,
+    plot: Step,
+    filter: Step,
 }
 
 /// Working memory for one view, made for its size.
@@ -141,35 +139,30 @@ pub struct CausticFilterInputs<'a> {
 impl CausticFilter {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
-        let stage = wgpu::ShaderStages::COMPUTE;
-        let plot_layout = device::layout(device, "lightfall::CausticFilter::plot", stage, &PLOT_SLOTS);
-        let filter_layout = device::layout(device, "lightfall::CausticFilter", stage, &FILTER_SLOTS);
-        let pipeline = |label, source, entry_point, layout| {
+        let step = |label, source, entry_point, slots: &[Slot]| {
             let spec = ComputeSpec {
                 label,
                 source,
                 entry_point,
-                layouts: &[layout],
+                layouts: &[],
                 constants: &[],
             };
-            device::compute_pipeline(device, &spec)
+            Step::new(device, slots, &spec)
         };
         Self {
-            device: device.clone(),
-            plot: pipeline(
+            plot: step(
                 "lightfall::CausticFilter::plot",
                 wgsl::CAUSTIC_FILTER_PLOT,
                 "plot_photons",
-                &plot_layout,
+                &PLOT_SLOTS,
             ),
-            filter: pipeline(
+            filter: step(
                 "lightfall::CausticFilter",
                 wgsl::CAUSTIC_FILTER,
                 "filter_tiles",
-                &filter_layout,
+                &FILTER_SLOTS,
             ),
-            plot_layout,
-            filter_layout,
+            device: device.clone(),
         }
     }
 
@@ -270,16 +263,16 @@ impl CausticFilter {
             resources.plot_groups = BindGroupCache::for_uses(plots.len());
         }
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
-        pass.set_pipeline(&self.plot);
+        pass.set_pipeline(&self.plot.pipeline);
         for bound in &plots {
-            let group = resources.plot_groups.get(&self.device, label, &self.plot_layout, bound);
+            let group = resources.plot_groups.get(&self.device, label, &self.plot.layout, bound);
             pass.set_bind_group(0, &group, &[]);
             pass.dispatch_workgroups(groups[0], groups[1], 1);
         }
         let group = resources
             .filter_groups
-            .get(&self.device, label, &self.filter_layout, &filtered);
-        pass.set_pipeline(&self.filter);
+            .get(&self.device, label, &self.filter.layout, &filtered);
+        pass.set_pipeline(&self.filter.pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups_indirect(&resources.tiles, 0);
         Ok(())

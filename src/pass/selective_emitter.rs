@@ -13,7 +13,7 @@
 //! times the interval, at the latest; where more changes than the budget allows, what waits gains on what changes again.
 //! Limits: lights that take another number of photons, as when one grows brighter, have all photons traced anew.
 
-use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
+use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot, Step};
 use crate::resource::photon_groups::LightsChange;
 use crate::resource::{Lights, PhotonGroups, Photons};
 use crate::{Error, Timestamps, wgsl};
@@ -102,12 +102,6 @@ pub struct SelectiveEmitter {
     choose: Step,
 }
 
-#[derive(Debug)]
-struct Step {
-    layout: wgpu::BindGroupLayout,
-    pipeline: wgpu::ComputePipeline,
-}
-
 /// Uniforms and bind groups, and how often groups were probed.
 #[derive(Debug)]
 pub struct SelectiveEmitterResources {
@@ -138,16 +132,14 @@ impl SelectiveEmitter {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
         let step = |label, source, entry_point, slots: &[Slot]| {
-            let layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, slots);
             let spec = ComputeSpec {
                 label,
                 source,
                 entry_point,
-                layouts: &[&layout],
+                layouts: &[],
                 constants: &[],
             };
-            let pipeline = device::compute_pipeline(device, &spec);
-            Step { layout, pipeline }
+            Step::new(device, slots, &spec)
         };
         Self {
             probe: step(

@@ -12,7 +12,7 @@
 //! texels × rays, whether anything is due or not; rays of none are over at once.
 
 use super::dispatch_64;
-use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot};
+use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot, Step};
 use crate::resource::{IlluminationMap, SurfaceLights, SurfaceRays};
 use crate::{Error, Timestamps, wgsl};
 
@@ -115,12 +115,6 @@ pub struct TexelGather {
     blend: Step,
 }
 
-#[derive(Debug)]
-struct Step {
-    layout: wgpu::BindGroupLayout,
-    pipeline: wgpu::ComputePipeline,
-}
-
 /// Uniforms and bind groups.
 #[derive(Debug)]
 pub struct TexelGatherResources {
@@ -157,16 +151,14 @@ impl TexelGather {
     /// The pass on this device. Needs no features and no more than default limits.
     pub fn new(device: &wgpu::Device) -> Self {
         let step = |label, source, entry_point, slots: &[Slot]| {
-            let layout = device::layout(device, label, wgpu::ShaderStages::COMPUTE, slots);
             let spec = ComputeSpec {
                 label,
                 source,
                 entry_point,
-                layouts: &[&layout],
+                layouts: &[],
                 constants: &[],
             };
-            let pipeline = device::compute_pipeline(device, &spec);
-            Step { layout, pipeline }
+            Step::new(device, slots, &spec)
         };
         Self {
             sum_changes: step(

@@ -6,6 +6,7 @@ pub(crate) mod evaluate;
 #[path = "../../examples/common/mod.rs"]
 mod examples;
 pub(crate) mod meshes;
+pub(crate) mod rooms;
 pub(crate) mod statistics;
 pub(crate) mod texture;
 

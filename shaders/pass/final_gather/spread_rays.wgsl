@@ -28,9 +28,7 @@ fn spread_rays(@builtin(global_invocation_id) id: vec3u) {
     let first = params.ray_count * (id.y * width + id.x);
     let own = shift(pixel);
     for (var i = 0u; i < params.ray_count; i++) {
-        // Hammersley's points.
-        let u = fract(vec2f((f32(i) + 0.5) / f32(params.ray_count), halton(i, 0u)) + own);
-        let direction = normalize(frame * sampling_cosine(min(u, vec2f(HALTON_BELOW_ONE))));
+        let direction = cosine_direction(frame, i, params.ray_count, own);
         rays[first + i] = SurfaceRay(receiver.position, packed, direction, 0u);
     }
 }

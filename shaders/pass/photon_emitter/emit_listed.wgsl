@@ -4,7 +4,7 @@
 
 @compute @workgroup_size(64)
 fn emit_listed_photons(@builtin(global_invocation_id) id: vec3u) {
-    let place = id.y * (listed.workgroups[0] * 64u) + id.x;
+    let place = path_list_place(id, listed.workgroups[0]);
     if place < listed.count {
         let index = listed.paths[place];
         emit_photon(index, random_pair(params.sample_offset + index, 0u), 1.0, 0u);

@@ -4,7 +4,7 @@
 
 @compute @workgroup_size(64)
 fn stream_listed(@builtin(global_invocation_id) id: vec3u) {
-    let place = id.y * (listed.workgroups[0] * 64u) + id.x;
+    let place = path_list_place(id, listed.workgroups[0]);
     if place >= listed.count {
         return;
     }

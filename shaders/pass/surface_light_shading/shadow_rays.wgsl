@@ -41,9 +41,3 @@ fn scale_of_rays(receiver: Receiver) -> f32 {
 fn ray_place(i: u32, all: f32, random: f32) -> f32 {
     return (f32(i) + random) / f32(params.ray_count) * all;
 }
-
-// A direction as dense as the cosine.
-fn ambient_direction(i: u32, normal: vec3f, random: vec2f) -> vec3f {
-    let u = fract(vec2f((f32(i) + 0.5) / f32(params.ray_count), halton(i, 0u)) + random);
-    return normalize(sampling_frame(normal) * sampling_cosine(min(u, vec2f(HALTON_BELOW_ONE))));
-}

@@ -48,7 +48,7 @@ fn spread_rays(@builtin(global_invocation_id) id: vec3u) {
         let normal = octahedral_pack(receiver.normal);
         let random = pixel_random(pixel);
         for (; ray < params.ray_count; ray++) {
-            let direction = ambient_direction(ray, receiver.normal, random);
+            let direction = cosine_direction(sampling_frame(receiver.normal), ray, params.ray_count, random);
             rays[first + ray] = SurfaceRay(receiver.position, normal, direction, 0u);
         }
     } else if receiver.is_seen {

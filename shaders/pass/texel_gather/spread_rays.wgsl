@@ -21,11 +21,9 @@ fn spread_rays(@builtin(global_invocation_id) id: vec3u) {
     }
     let texel = chosen.paths[place];
     let i = index % params.ray_count;
-    // Hammersley's points, shifted by numbers of the texel's own.
     let own = hash_u32(texel ^ hash_u32(params.sample_offset));
     let shift = vec2f(hash_unit(own, 0u), hash_unit(own, 1u));
-    let u = fract(vec2f((f32(i) + 0.5) / f32(params.ray_count), halton(i, 0u)) + shift);
     let normal = lights[texel].normal;
-    let direction = normalize(sampling_frame(normal) * sampling_cosine(min(u, vec2f(HALTON_BELOW_ONE))));
+    let direction = cosine_direction(sampling_frame(normal), i, params.ray_count, shift);
     rays[index] = SurfaceRay(lights[texel].position, octahedral_pack(normal), direction, 0u);
 }

@@ -12,7 +12,7 @@
 pub(crate) mod raster;
 pub(crate) mod tiled;
 
-use crate::gpu::{self as device, BindGroupCache, Bound, ComputeSpec, Slot, TextureSpec};
+use crate::gpu::{self as device, BindGroupCache, Bound, ComputeSpec, Slot, Step, TextureSpec};
 #[cfg(doc)]
 use crate::resource::GBufferViews;
 use crate::resource::{GBuffer, Irradiance, MarkedPixels, PHOTON_BYTES, Photons, Subsampling};
@@ -244,27 +244,6 @@ pub struct PhotonSplatter {
 enum Shape {
     Tiled(Box<Tiled>),
     Raster(Raster),
-}
-
-/// A compute shader of one entry point.
-#[derive(Debug)]
-struct Step {
-    layout: wgpu::BindGroupLayout,
-    pipeline: wgpu::ComputePipeline,
-}
-
-impl Step {
-    fn new(device: &wgpu::Device, slots: &[Slot], spec: &ComputeSpec<'_>) -> Self {
-        let layout = device::layout(device, spec.label, wgpu::ShaderStages::COMPUTE, slots);
-        let pipeline = device::compute_pipeline(
-            device,
-            &ComputeSpec {
-                layouts: &[&layout],
-                ..*spec
-            },
-        );
-        Self { layout, pipeline }
-    }
 }
 
 /// Working memory for one view, made for the size of its irradiance.

@@ -1,8 +1,8 @@
 //! The blended shapes: a quad or a flattened icosahedron for each photon, added up by the raster units.
 
+use super::splatted_slots;
 use super::{Bandwidth, PhotonSplatterConfig, PhotonSplatterInputs, SplatShape, bin_total, gpu as shared};
-use super::{Step, splatted_slots};
-use crate::gpu::{self as device, BindGroupCache, ComputeSpec, RenderSpec, Slot};
+use crate::gpu::{self as device, BindGroupCache, ComputeSpec, RenderSpec, Slot, Step};
 use crate::pass::dispatch_64;
 use crate::resource::Subsampling;
 use crate::{Error, wgsl};
