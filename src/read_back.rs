@@ -106,8 +106,22 @@ impl ReadBackRing {
         self.lost.swap(false, Ordering::AcqRel)
     }
 
+    /// Bytes of a result.
+    pub(crate) fn size(&self) -> u64 {
+        self.size
+    }
+
     /// The latest result that has arrived; older ones are let go.
     pub(crate) fn take<T: bytemuck::AnyBitPattern>(&mut self) -> Option<T> {
+        self.take_with(|bytes| bytemuck::try_pod_read_unaligned(&bytes[..size_of::<T>()]).ok())
+    }
+
+    /// The same, as words.
+    pub(crate) fn take_words(&mut self) -> Option<Vec<u32>> {
+        self.take_with(|bytes| Some(bytemuck::pod_collect_to_vec(bytes)))
+    }
+
+    fn take_with<T>(&mut self, read: impl Fn(&[u8]) -> Option<T>) -> Option<T> {
         let mut latest = None;
         let mut newest = 0;
         for slot in &self.slots {
@@ -117,7 +131,7 @@ impl ReadBackRing {
             if slot.order > newest
                 && let Ok(mapped) = slot.buffer.slice(..).get_mapped_range()
             {
-                latest = bytemuck::try_pod_read_unaligned(&mapped[..size_of::<T>()]).ok();
+                latest = read(&mapped);
                 newest = slot.order;
             }
             slot.buffer.unmap();

@@ -5,17 +5,17 @@ use crate::gpu::Slot;
 use crate::pass::photon_splatter::{raster, tiled};
 use crate::pass::{
     accumulator, caustic_filter, composite, depth_hierarchy_build, direct_light, env_map_lighting, env_map_selector,
-    final_gather, fused_composite, glossy_light, image_space_tracer, irradiance_filter, nearest_occluder,
-    photon_emitter, photon_grid, photon_guiding, photon_splatter, photon_stream, photon_walk, selective_emitter,
-    soft_shadow, specular_paths, stable_sort, surface_light_shading, texel_gather, texel_shading, tone_map,
-    trace_statistics, upsampler,
+    final_gather, fused_composite, glossy_light, hemisphere_gather, image_space_tracer, irradiance_filter,
+    nearest_occluder, photon_emitter, photon_grid, photon_guiding, photon_splatter, photon_stream, photon_walk,
+    selective_emitter, soft_shadow, specular_paths, stable_sort, surface_light_shading, texel_gather, texel_shading,
+    tone_map, trace_statistics, upsampler,
 };
 #[cfg(all(feature = "bvh", feature = "reference"))]
 use crate::reference::{emitters, path_tracer};
 use crate::resource::{
     MAX_LIGHTS, Photon, PhotonMap, PhotonState, SurfaceHit, SurfaceHitKind, SurfaceRay, environment, g_buffer,
-    guiding_tables, lights, marked_pixels, mesh_geometry, path_list, pending_penumbrae, photon_groups, photon_pool,
-    photon_targets, surface_lights, view,
+    guiding_tables, hemispheres, lights, marked_pixels, mesh_geometry, path_list, pending_penumbrae, photon_groups,
+    photon_pool, photon_targets, surface_lights, view,
 };
 use crate::scene::Material;
 use crate::wgsl;
@@ -248,7 +248,7 @@ fn twins() -> Vec<Twin> {
             map_count, map_size, iterations, epsilon, most_fetches, doubts_normals,
         }),
         twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "ListParams", image_space_tracer::gpu::ListParams { ray_count, row }),
-        twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "SurfaceRay", SurfaceRay { position, normal, direction, pad }),
+        twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "SurfaceRay", SurfaceRay { position, normal, direction, tag }),
         twin!(wgsl::IMAGE_SPACE_TRACER_RAYS, "SurfaceHit", SurfaceHit {
             distance, kind, normal, reflectance, fetches, maps, steps, lobe,
         }),
@@ -377,6 +377,11 @@ fn twins() -> Vec<Twin> {
         twin!(wgsl::CAUSTIC_FILTER, "TileList", caustic_filter::gpu::TileList { workgroups, count, tiles }),
         twin!(wgsl::TEXEL_GATHER_SUM, "Params", texel_gather::gpu::Params {
             texel_count, budget, ray_count, round, threshold, change_scale, flux_of_step, blend, row, sample_offset,
+            least_photons, guided, keeps_due, slot_count, slot_row,
+        }),
+        twin!(wgsl::HEMISPHERE_GATHER, "Params", hemisphere_gather::gpu::Params { size, pixel_count, half_side }),
+        twin!(wgsl::HEMISPHERE_GATHER, "Hemisphere", hemispheres::gpu::Hemisphere {
+            eye, texel, right, column, up, row, normal, _pad,
         }),
         twin!(wgsl::TEXEL_SHADING, "Params", texel_shading::gpu::Params { factor, reach }),
         twin!(wgsl::SELECTIVE_EMITTER_PROBE, "Params", selective_emitter::gpu::Params {
@@ -525,6 +530,9 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "GlossyLight" => vec![&glossy_light::SLOTS],
         "EnvMapLighting" => vec![&env_map_lighting::SLOTS],
         "PhotonStream" => vec![&photon_stream::STREAM_SLOTS, &photon_walk::LIST_SLOTS],
+        "HemisphereGather" => vec![&hemisphere_gather::SLOTS],
+        "TexelGather radiosity" => vec![&texel_gather::RADIOSITY_SLOTS],
+        "TexelGather incident" => vec![&texel_gather::INCIDENT_SLOTS],
         "TexelGather changes" => vec![&texel_gather::CHANGE_SLOTS],
         "TexelGather due" => vec![&texel_gather::DUE_SLOTS],
         "TexelGather choice" => vec![&texel_gather::CHOICE_SLOTS],

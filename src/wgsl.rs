@@ -419,7 +419,7 @@ pub(crate) const ENV_MAP_LIGHTING: &str = compose![
 pub(crate) const PHOTON_STREAM: &str = compose![
     "pass/photon_stream/stream_impacts.wgsl",
     "pass/photon_stream/stream_listed.wgsl",
-    "pass/photon_stream/impact.wgsl",
+    "common/impact.wgsl",
     "common/nearest_surface_light.wgsl",
     "pass/photon_stream/exitant_flux.wgsl",
     "pass/photon_stream/params.wgsl",
@@ -433,7 +433,7 @@ pub(crate) const PHOTON_STREAM: &str = compose![
 
 pub(crate) const PHOTON_STREAM_NEAR: &str = compose![
     "pass/photon_stream/keep_near.wgsl",
-    "pass/photon_stream/impact.wgsl",
+    "common/impact.wgsl",
     "pass/photon_stream/params.wgsl",
     "common/surface_light.wgsl",
     "common/photon.wgsl",
@@ -443,7 +443,7 @@ pub(crate) const PHOTON_STREAM_NEAR: &str = compose![
 
 pub(crate) const PHOTON_STREAM_PLACES: &str = compose![
     "pass/photon_stream/place_lights.wgsl",
-    "pass/photon_stream/impact.wgsl",
+    "common/impact.wgsl",
     "common/surface_light.wgsl",
 ];
 
@@ -603,6 +603,33 @@ pub(crate) const FINAL_GATHER_SUM: &str = compose![
     "common/cube_face.wgsl",
 ];
 
+pub(crate) const HEMISPHERE_GATHER: &str = compose![
+    "pass/hemisphere_gather.wgsl",
+    "common/nearest_surface_light.wgsl",
+    "common/surface_light.wgsl",
+    "common/surface_texel.wgsl",
+    "common/lobe.wgsl",
+    "common/octahedral.wgsl",
+    "common/reflectance.wgsl",
+];
+
+pub(crate) const TEXEL_GATHER_RADIOSITY: &str = compose![
+    "pass/texel_gather/sum_radiosity.wgsl",
+    "pass/texel_gather/params.wgsl",
+    "common/surface_light.wgsl",
+];
+
+pub(crate) const TEXEL_GATHER_INCIDENT: &str = compose![
+    "pass/texel_gather/count_incident.wgsl",
+    "pass/texel_gather/params.wgsl",
+    "pass/texel_gather/incident_cell.wgsl",
+    "common/impact.wgsl",
+    "common/surface_light.wgsl",
+    "common/photon.wgsl",
+    "common/octahedral.wgsl",
+    "common/sampling.wgsl",
+];
+
 pub(crate) const TEXEL_GATHER_CHANGES: &str = compose![
     "pass/texel_gather/sum_changes.wgsl",
     "pass/texel_gather/params.wgsl",
@@ -625,6 +652,7 @@ pub(crate) const TEXEL_GATHER_CHOICE: &str = compose![
 pub(crate) const TEXEL_GATHER_SPREAD: &str = compose![
     "pass/texel_gather/spread_rays.wgsl",
     "pass/texel_gather/params.wgsl",
+    "pass/texel_gather/incident_cell.wgsl",
     "common/surface_light.wgsl",
     "common/path_list.wgsl",
     "common/surface_rays.wgsl",
@@ -1145,6 +1173,9 @@ pub const MODULES: &[(&str, &str)] = &[
     ("SurfaceLightShading sum", SURFACE_LIGHT_SUM),
     ("FinalGather spread", FINAL_GATHER_SPREAD),
     ("FinalGather sum", FINAL_GATHER_SUM),
+    ("HemisphereGather", HEMISPHERE_GATHER),
+    ("TexelGather radiosity", TEXEL_GATHER_RADIOSITY),
+    ("TexelGather incident", TEXEL_GATHER_INCIDENT),
     ("TexelGather changes", TEXEL_GATHER_CHANGES),
     ("TexelGather due", TEXEL_GATHER_DUE),
     ("TexelGather choice", TEXEL_GATHER_CHOICE),

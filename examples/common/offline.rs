@@ -1,7 +1,9 @@
 //! Renders a scene without a window: one device, one view, any number of frames accumulated.
 
 use super::adapter::Gpu;
-use lightfall::frame::{GiRenderer, IndirectMethod, SceneInputs, Settings, ViewInputs, ViewResources};
+use lightfall::frame::{
+    GiRenderer, IndirectMethod, SceneInputs, Settings, TexelGatherMethod, ViewInputs, ViewResources,
+};
 use lightfall::pass::{
     Accumulator, AccumulatorInputs, AccumulatorResources, CompositeSettings, HopStatistics, TraceStatistics,
     TraceStatisticsInputs, TraceStatisticsResources,
@@ -154,6 +156,10 @@ impl<'a> Offline<'a> {
         if self.is_first {
             self.renderer.fill_illumination_map(&scene_inputs)?;
             self.is_first = false;
+            if self.renderer.settings().illumination_maps.method != TexelGatherMethod::Rays {
+                self.renderer.gather_illumination_map(queue, &mut self.geometry)?;
+                return self.render_frame(timestamps);
+            }
         }
         self.renderer.record_scene(&mut encoder, &scene_inputs)?;
         let view_inputs = ViewInputs {

@@ -5,7 +5,8 @@ struct SurfaceRay {
     position: vec3f,
     normal: u32,
     direction: vec3f,
-    pad: u32,
+    // For whoever made it
+    tag: u32,
 }
 
 // Twin of `resource::SurfaceHit`.

@@ -71,6 +71,8 @@ pub struct GiRenderer {
     recapture: Recapture,
     /// Layers of the environment maps that this frame captures.
     env_map_layers: Vec<u32>,
+    /// Of texels that the host's draws gather.
+    hemisphere_views: std::ops::Range<usize>,
     /// That photons were last traced in.
     photons_frame: Option<UnitFrame>,
     /// Of the photons, and of rays to lamps.
@@ -220,6 +222,7 @@ impl GiRenderer {
             env_map_views: 0..0,
             recapture: Recapture::default(),
             env_map_layers: Vec::new(),
+            hemisphere_views: 0..0,
             photons_frame: None,
             sample_offset: 0,
             guiding: GuidingSchedule::default(),
@@ -559,6 +562,11 @@ impl GiRenderer {
             self.views
                 .extend(self.env_map_layers.iter().map(|&layer| all[layer as usize]));
         }
+        let hemispheres_from = self.views.len();
+        if let Some(hemispheres) = self.indirect.as_mut().and_then(IndirectScene::hemispheres_mut) {
+            let planned = hemispheres.plan(queue, &state.frame, &self.surface_places)?;
+            self.views.extend(planned);
+        }
         let selection_from = self.views.len();
         let has_photons = traced_photons(&self.state, &self.photons_frame, &self.indirect).is_some();
         let work = self
@@ -571,7 +579,8 @@ impl GiRenderer {
             camera.capture = *view;
         }
         self.light_views = lights_from..maps_from;
-        self.env_map_views = maps_from..selection_from;
+        self.env_map_views = maps_from..hemispheres_from;
+        self.hemisphere_views = hemispheres_from..selection_from;
         let context = PrepareContext {
             device: &self.device,
             queue,
@@ -636,8 +645,8 @@ impl GiRenderer {
         self.submit_rounds(rounds, inputs)
     }
 
-    /// Forgets the illumination map, traces all photons and gathers all texels at once instead of over many frames: at the
-    /// start, after a cut. Submits what it records and does not wait; call it after `prepare`, before `record_scene`. Nothing
+    /// Forgets the illumination map, traces all photons and gathers all texels at once instead of over many frames, unless the
+    /// host's draws gather them ([`GiRenderer::gather_illumination_map`]): at the start, after a cut. Submits what it records and does not wait; call it after `prepare`, before `record_scene`. Nothing
     /// where there is no such map.
     ///
     /// # Errors
@@ -652,9 +661,51 @@ impl GiRenderer {
         if let Some(indirect) = &mut self.indirect {
             indirect.restart_illumination();
         }
-        let texels = 2 * self.surface_places.len() as u32;
         let a_frame = self.settings.illumination_maps.gather.a_frame.max(1);
-        self.submit_rounds(texels.div_ceil(a_frame), inputs)
+        let rounds = match self.settings.gathers_by_draws() {
+            true => 1,
+            false => self.texel_count().div_ceil(a_frame),
+        };
+        self.submit_rounds(rounds, inputs)
+    }
+
+    /// Gathers all texels of the illumination map at once by the host's draws, where these gather, from the light of the last frame
+    /// that was recorded or filled ([`GiRenderer::fill_illumination_map`]): at the start, after a cut. Submits what it records
+    /// and does not wait. It prepares the geometry for views of its own: call `prepare` again before `record_scene`.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
+    pub fn gather_illumination_map(&mut self, queue: &wgpu::Queue, geometry: &mut dyn Geometry) -> Result<(), Error> {
+        let texels = self.texel_count();
+        let (Some(state), Some(indirect)) = (&self.state, &mut self.indirect) else {
+            return Ok(());
+        };
+        let Some(at_once) = indirect.hemispheres_mut().map(|h| h.capacity()) else {
+            return Ok(());
+        };
+        let context = PrepareContext {
+            device: &self.device,
+            queue,
+            frame: &state.frame,
+        };
+        for first in (0..texels).step_by(at_once as usize) {
+            let Some(hemispheres) = indirect.hemispheres_mut() else {
+                break;
+            };
+            let chosen = first..texels.min(first + at_once);
+            let mut views = hemispheres.plan_texels(queue, (&state.frame, &self.surface_places), chosen)?;
+            number(&mut views);
+            geometry.prepare(&context, &views)?;
+            let mut encoder = self.device.create_command_encoder(&Default::default());
+            indirect.record_hemispheres(&mut encoder, &self.passes.photons, (queue, &*geometry, &views))?;
+            queue.submit([encoder.finish()]);
+        }
+        Ok(())
+    }
+
+    /// Texels of the illumination map: two at each place.
+    fn texel_count(&self) -> u32 {
+        2 * self.surface_places.len() as u32
     }
 
     /// Submits photons, and what is made of them, so many times.
@@ -666,9 +717,10 @@ impl GiRenderer {
             }
             self.record_photons(&mut encoder, inputs)?;
             inputs.queue.submit([encoder.finish()]);
-            // What environment maps show is captured by now.
+            // What environment maps and hemispheres show is captured by now.
             self.env_map_layers.clear();
             self.env_map_views.end = self.env_map_views.start;
+            self.hemisphere_views.end = self.hemisphere_views.start;
         }
         Ok(())
     }
@@ -715,6 +767,7 @@ impl GiRenderer {
                 shadow_maps: &direct.shadow_maps,
                 views: &self.views[self.env_map_views.clone()],
                 layers: &self.env_map_layers,
+                hemisphere_views: &self.views[self.hemisphere_views.clone()],
                 updates_guiding: self.guiding.take_update(),
                 revision: self.revision,
                 #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]

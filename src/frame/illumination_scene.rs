@@ -2,6 +2,7 @@
 //! come and go, and the texels' irradiance, gathered again where it has changed.
 
 use super::Settings;
+use super::hemisphere_scene::{DrawInputs, HemisphereScene};
 use super::indirect_scene::PhotonPasses;
 use super::ray_tracers::{RayTracers, TracedScene};
 use super::selective_photons::Retraced;
@@ -23,20 +24,36 @@ pub(super) struct IlluminationScene {
     stream: PhotonStreamResources,
     gather: TexelGatherResources,
     tracers: RayTracers,
+    /// If the host's draws gather, instead of rays.
+    hemispheres: Option<HemisphereScene>,
     frame: Option<UnitFrame>,
 }
 
 impl IlluminationScene {
-    pub(super) fn new(device: &wgpu::Device, settings: &Settings) -> Result<Self, Error> {
+    pub(super) fn new(device: &wgpu::Device, queue: &wgpu::Queue, settings: &Settings) -> Result<Self, Error> {
         let own = &settings.illumination_maps;
         let lights = SurfaceLights::new(device, own.texels, settings.bounces)?;
         let mut pool = PhotonPool::new(device, settings.traced_photons(), settings.bounces + 1)?;
         pool.note_changes();
+        let a_frame = own.gather.a_frame;
+        let map = IlluminationMap::new(device, &lights, a_frame)?;
+        let shape = own.gather_shape();
+        let hemispheres = shape.map(|shape| HemisphereScene::new(device, queue, settings, (shape, &map)));
+        let rays = if shape.is_some() {
+            1
+        } else {
+            a_frame.saturating_mul(own.gather.rays)
+        };
+        let mut gather = TexelGatherResources::new(device)?;
+        if own.gather.guided > 0.0 {
+            gather.guide_rays(device, a_frame)?;
+        }
         Ok(Self {
-            map: IlluminationMap::new(device, &lights, own.gather.a_frame)?,
-            rays: SurfaceRays::new(device, own.gather.a_frame.saturating_mul(own.gather.rays))?,
+            map,
+            rays: SurfaceRays::new(device, rays)?,
             stream: PhotonStreamResources::new(device)?,
-            gather: TexelGatherResources::new(device)?,
+            gather,
+            hemispheres: hemispheres.transpose()?,
             tracers: RayTracers::new(device)?,
             frame: None,
             lights,
@@ -69,6 +86,26 @@ impl IlluminationScene {
     pub(super) fn restart(&mut self) {
         self.pool.restart();
         self.map.restart();
+        if let Some(hemispheres) = &mut self.hemispheres {
+            hemispheres.restart();
+        }
+    }
+
+    /// If the host's draws gather.
+    pub(super) fn hemispheres_mut(&mut self) -> Option<&mut HemisphereScene> {
+        self.hemispheres.as_mut()
+    }
+
+    /// Records what was planned of hemispheres, with the light of the last frame that was recorded.
+    pub(super) fn record_draws(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        inputs: &DrawInputs<'_>,
+    ) -> Result<(), Error> {
+        match &mut self.hemispheres {
+            Some(hemispheres) => hemispheres.record_draws(encoder, inputs, (&self.lights, &self.map)),
+            None => Ok(()),
+        }
     }
 
     /// Records the photons of a frame, and the texels that these change.
@@ -122,13 +159,26 @@ impl IlluminationScene {
             lights: &self.lights,
             share: self.pool.share(),
             area: inputs.photons.area,
-            rays: &self.rays,
+            rays: self.hemispheres.is_none().then_some(&self.rays),
+            incident: Some((&self.pool, &traced.photons)),
             map: &mut self.map,
             sample_offset: inputs.sample_offset,
             settings: &settings.illumination_maps.gather,
             timestamps: scene.timestamps,
         };
         gather.record_rays(encoder, &mut self.gather, &mut gather_inputs)?;
+        if let Some(hemispheres) = &mut self.hemispheres {
+            let draw_inputs = DrawInputs {
+                queue: scene.queue,
+                passes,
+                geometry: scene.geometry,
+                views: inputs.photons.hemisphere_views,
+                timestamps: scene.timestamps,
+            };
+            hemispheres.record(encoder, &draw_inputs, (&self.lights, gather_inputs.map))?;
+            gather.record(encoder, &mut self.gather, &gather_inputs);
+            return Ok(());
+        }
         let traced_scene = TracedScene {
             queue: scene.queue,
             passes,
@@ -159,5 +209,6 @@ impl IlluminationScene {
             + self.stream.memory_use()
             + self.gather.memory_use()
             + self.tracers.memory_use()
+            + self.hemispheres.as_ref().map_or(0, HemisphereScene::memory_use)
     }
 }

@@ -2,6 +2,7 @@
 
 #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
 use super::PhotonFeeder;
+use super::hemisphere_scene::{DrawInputs, HemisphereScene};
 use super::illumination_scene::IlluminationScene;
 use super::surface_light_scene::SurfaceLightScene;
 use super::traced_photons::{TracedPhotons, WalkInputs};
@@ -12,12 +13,12 @@ use crate::pass::BvhTracer;
 use crate::pass::{
     Bandwidth, DepthHierarchyBuild, DepthHierarchyBuildInputs, DepthHierarchyBuildResources, EnvMapCapture,
     EnvMapCaptureInputs, EnvMapCaptureResources, EnvMapLighting, EnvMapLightingInputs, EnvMapLightingResources,
-    EnvMapLightingSettings, FirstHits, Guiding, GuidingUpdateInputs, GuidingUpdateResources, ImageSpaceTracer,
-    PhotonEmitter, PhotonGrid, PhotonGridInputs, PhotonGridResources, PhotonGuiding, PhotonSpread, PhotonStream,
-    SelectiveEmitter, SortedPhotons, TexelGather,
+    EnvMapLightingSettings, FirstHits, Guiding, GuidingUpdateInputs, GuidingUpdateResources, HemisphereGather,
+    ImageSpaceTracer, PhotonEmitter, PhotonGrid, PhotonGridInputs, PhotonGridResources, PhotonGuiding, PhotonSpread,
+    PhotonStream, SelectiveEmitter, SortedPhotons, TexelGather,
 };
 use crate::resource::{
-    CaptureView, DepthHierarchy, EnvMapIrradiance, EnvMaps, GuidingTables, Lights, PhotonGroups, PhotonMap,
+    CaptureView, DepthHierarchy, EnvMapIrradiance, EnvMaps, Geometry, GuidingTables, Lights, PhotonGroups, PhotonMap,
     PhotonTargets, Photons, ShadowMaps,
 };
 use crate::scene::{BoundingSphere, SurfacePlace, UnitFrame};
@@ -43,6 +44,8 @@ pub(super) struct PhotonPasses {
     pub(super) photon_stream: Option<PhotonStream>,
     /// If it comes from illumination maps.
     pub(super) texel_gather: Option<TexelGather>,
+    /// If the host's draws gather there.
+    pub(super) hemisphere_gather: Option<HemisphereGather>,
     photon_grid: PhotonGrid,
     /// If the settings light rough metal by photons.
     glossy_grid: Option<PhotonGrid>,
@@ -89,6 +92,8 @@ pub(super) struct PhotonInputs<'a> {
     pub(super) views: &'a [CaptureView],
     /// The layers that these are of.
     pub(super) layers: &'a [u32],
+    /// Of texels that the host's draws gather.
+    pub(super) hemisphere_views: &'a [CaptureView],
     /// Whether it is time to look where photons are seen.
     pub(super) updates_guiding: bool,
     /// Of lights and geometry.
@@ -124,6 +129,7 @@ impl PhotonPasses {
             photon_stream: settings.indirect_method.has_places().then(|| PhotonStream::new(device)),
             texel_gather: (settings.indirect_method == IndirectMethod::IlluminationMaps)
                 .then(|| TexelGather::new(device)),
+            hemisphere_gather: settings.gathers_by_draws().then(|| HemisphereGather::new(device)),
             photon_grid: grid(SortedPhotons::OnDiffuse),
             glossy_grid: (settings.glossy_method == GlossyMethod::Photons).then(|| grid(SortedPhotons::OnGlossy)),
         }
@@ -182,7 +188,7 @@ impl IndirectScene {
                 .then(|| SurfaceLightScene::new(device, settings))
                 .transpose()?,
             illumination: (settings.indirect_method == IndirectMethod::IlluminationMaps)
-                .then(|| IlluminationScene::new(device, settings).map(Box::new))
+                .then(|| IlluminationScene::new(device, queue, settings).map(Box::new))
                 .transpose()?,
             caustics: None,
             grid: None,
@@ -292,6 +298,31 @@ impl IndirectScene {
 
     pub(super) fn illumination(&self) -> Option<&IlluminationScene> {
         self.illumination.as_deref()
+    }
+
+    /// If the host's draws gather light at texels.
+    pub(super) fn hemispheres_mut(&mut self) -> Option<&mut HemisphereScene> {
+        self.illumination.as_deref_mut()?.hemispheres_mut()
+    }
+
+    /// Records what was planned of these, outside of a frame.
+    pub(super) fn record_hemispheres(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        passes: &PhotonPasses,
+        (queue, geometry, views): (&wgpu::Queue, &dyn Geometry, &[CaptureView]),
+    ) -> Result<(), Error> {
+        let draw_inputs = DrawInputs {
+            queue,
+            passes,
+            geometry,
+            views,
+            timestamps: None,
+        };
+        match &mut self.illumination {
+            Some(illumination) => illumination.record_draws(encoder, &draw_inputs),
+            None => Ok(()),
+        }
     }
 
     /// Puts surface lights, or texels, where they stand this frame.

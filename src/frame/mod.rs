@@ -7,6 +7,7 @@ mod direct_view;
 mod env_map_placement;
 mod gi_renderer;
 mod guiding_schedule;
+mod hemisphere_scene;
 mod illumination_scene;
 mod indirect_scene;
 mod indirect_view;
@@ -30,5 +31,5 @@ pub use photon_feeder::PhotonFeeder;
 pub use plan::{Plan, PlannedStage, Stage};
 pub use settings::{
     CausticMethod, CausticSettings, FinalGatherSettings, GlossyMethod, IlluminationMapSettings, IndirectMethod,
-    LightPlacement, SelectiveSettings, Settings, SurfaceLightSettings, TracerKind, Upsampling,
+    LightPlacement, SelectiveSettings, Settings, SurfaceLightSettings, TexelGatherMethod, TracerKind, Upsampling,
 };

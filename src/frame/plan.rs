@@ -1,6 +1,6 @@
 //! Model only what the scene requires: which stages run, and why.
 
-use super::{GlossyMethod, IndirectMethod, LightPlacement, Settings, TracerKind, Upsampling};
+use super::{GlossyMethod, IlluminationMapSettings, IndirectMethod, LightPlacement, Settings, TracerKind, Upsampling};
 use crate::pass::{FirstHits, IndirectShadows};
 use crate::resource::MAX_DIRECT_POLYGONS;
 use crate::scene::SceneSummary;
@@ -192,6 +192,14 @@ fn is_lit(summary: &SceneSummary, settings: &Settings) -> bool {
     has_lights || !summary.emissive_triangles.is_empty()
 }
 
+/// What gathers the light of a texel.
+fn gathered_by(settings: &IlluminationMapSettings) -> String {
+    match settings.gather_shape() {
+        None => format!("{} rays", settings.gather.rays),
+        Some(shape) => format!("{} draws of the scene", shape.views()),
+    }
+}
+
 /// How many suns stand for the environment, at most.
 fn suns(summary: &SceneSummary, settings: &Settings) -> u32 {
     if summary.environment_lights > 0 {
@@ -332,8 +340,10 @@ fn estimates(indirect: &(bool, String), settings: &Settings) -> Estimates {
             all.texels = (
                 true,
                 format!(
-                    "{} places, {} texels of {} rays a frame at most",
-                    own.texels, own.gather.a_frame, own.gather.rays
+                    "{} places, {} texels of {} a frame at most",
+                    own.texels,
+                    own.gather.a_frame,
+                    gathered_by(own)
                 ),
             );
         }

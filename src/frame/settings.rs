@@ -8,7 +8,7 @@ use crate::pass::{
     PhotonSplatterConfig, PhotonSplatterSettings, SelectiveEmitterSettings, ShadowMethod, SoftShadowSettings,
     SplatShape, SurfaceLightShadingSettings, TexelGatherSettings, TraceMethod, UpsamplerSettings,
 };
-use crate::resource::{Lights, MAX_LIGHTS, Subsampling};
+use crate::resource::{GatherShape, Lights, MAX_LIGHTS, Subsampling};
 
 /// Most scatterings of a path.
 const MAX_BOUNCES: u32 = 64;
@@ -148,6 +148,18 @@ impl Default for SelectiveSettings {
     }
 }
 
+/// What gathers the light of a texel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum TexelGatherMethod {
+    /// Rays, which meet what photons do.
+    #[default]
+    Rays,
+    /// The host's draws onto a square above the texel, which stands for all of its hemisphere.
+    Plane,
+    /// The host's draws onto the upper half of a cube.
+    Cube,
+}
+
 /// Irradiance kept at texels of surfaces.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IlluminationMapSettings {
@@ -156,6 +168,13 @@ pub struct IlluminationMapSettings {
     pub texels: u32,
     /// How and when they are gathered.
     pub gather: TexelGatherSettings,
+    /// By what: draws begin some frames after a change, for which texels these are for comes back from the GPU, and want fewer
+    /// texels a frame.
+    pub method: TexelGatherMethod,
+    /// Pixels that draws are wide, even, 2 to 256.
+    pub hemisphere_size: u32,
+    /// Half the side of a plane, in distances from the texel, above 0 and up to 16. Wider covers more, and more coarsely.
+    pub half_side: f32,
     /// How far from a pixel texels count, in times that they lie apart, above 0 and up to 8. More is smoother and blurrier.
     pub reach: f32,
 }
@@ -165,7 +184,23 @@ impl Default for IlluminationMapSettings {
         Self {
             texels: 1000,
             gather: TexelGatherSettings::default(),
+            method: TexelGatherMethod::default(),
+            hemisphere_size: 32,
+            half_side: 2.0,
             reach: 1.5,
+        }
+    }
+}
+
+impl IlluminationMapSettings {
+    /// What draws go onto, if they gather.
+    pub(super) fn gather_shape(&self) -> Option<GatherShape> {
+        match self.method {
+            TexelGatherMethod::Rays => None,
+            TexelGatherMethod::Plane => Some(GatherShape::Plane {
+                half_side: self.half_side,
+            }),
+            TexelGatherMethod::Cube => Some(GatherShape::Cube),
         }
     }
 }
@@ -546,6 +581,12 @@ impl Settings {
             IndirectMethod::Splatting | IndirectMethod::FinalGather => self.selective.is_on,
         };
         is_wanted && self.guided_photons == 0.0 && self.photons > 0
+    }
+
+    /// Whether the host's draws gather light at texels.
+    pub(super) fn gathers_by_draws(&self) -> bool {
+        let own = &self.illumination_maps;
+        self.indirect_method == IndirectMethod::IlluminationMaps && own.gather_shape().is_some()
     }
 
     /// Whether photons that came a short way stand in for what surface lights lose there.
@@ -970,6 +1011,38 @@ const KNOBS: &[Knob] = &[
         "above 0, at most 1",
         illumination_maps.gather.blend,
         |v: f32| v > 0.0 && v <= 1.0
+    ),
+    choice!(
+        "illumination_maps.gather",
+        "rays, plane or cube",
+        illumination_maps.method,
+        ["rays", TexelGatherMethod::Rays],
+        ["plane", TexelGatherMethod::Plane],
+        ["cube", TexelGatherMethod::Cube]
+    ),
+    field!(
+        "illumination_maps.hemisphere_size",
+        "even, 2 to 256: pixels",
+        illumination_maps.hemisphere_size,
+        |v| (2..=256).contains(&v) && v % 2 == 0
+    ),
+    field!(
+        "illumination_maps.half_side",
+        "above 0, at most 16",
+        illumination_maps.half_side,
+        |v: f32| v > 0.0 && v <= 16.0
+    ),
+    field!(
+        "illumination_maps.guided",
+        "0 to below 1: share of the rays",
+        illumination_maps.gather.guided,
+        |v: f32| (0.0..1.0).contains(&v)
+    ),
+    field!(
+        "illumination_maps.least_photons",
+        "0 or more",
+        illumination_maps.gather.least_photons,
+        |_| true
     ),
     field!(
         "illumination_maps.reach",

@@ -20,6 +20,7 @@ mod full_screen;
 pub(crate) mod fused_composite;
 mod g_buffer_capture;
 pub(crate) mod glossy_light;
+pub(crate) mod hemisphere_gather;
 pub(crate) mod image_space_tracer;
 pub(crate) mod irradiance_filter;
 pub(crate) mod nearest_occluder;
@@ -60,6 +61,7 @@ pub use final_gather::{FinalGather, FinalGatherInputs, FinalGatherResources};
 pub use fused_composite::{FusedComposite, FusedCompositeInputs, FusedCompositeResources};
 pub use g_buffer_capture::{GBufferCapture, GBufferCaptureInputs};
 pub use glossy_light::{GlossyLight, GlossyLightInputs, GlossyLightResources};
+pub use hemisphere_gather::{HemisphereGather, HemisphereGatherInputs, HemisphereGatherResources};
 pub use image_space_tracer::{
     ImageSpaceTracer, ImageSpaceTracerInputs, ImageSpaceTracerRayInputs, ImageSpaceTracerResources,
     ImageSpaceTracerSettings, TraceMethod,

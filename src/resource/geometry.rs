@@ -44,7 +44,7 @@ pub struct CaptureTargets {
 impl CaptureTargets {
     /// Targets of views of this purpose.
     ///
-    /// Lights, candidates and environment maps: one `rgba32uint`, written with `surface_texel_pack` of
+    /// Lights, candidates, environment maps and hemispheres: one `rgba32uint`, written with `surface_texel_pack` of
     /// [`wgsl::CAPTURE`](crate::wgsl::CAPTURE). The camera: octahedral normal (`vec2f`, what `octahedral_encode` makes of it),
     /// base colour (`vec4f`, alpha 1), emission (`vec4f`) and the number of the surface (`u32`), as
     /// [`GBufferViews`](super::GBufferViews) describes them.

@@ -14,6 +14,8 @@ pub struct IlluminationMap {
     surface_changes: wgpu::Buffer,
     surface_areas: wgpu::Buffer,
     counts: wgpu::Buffer,
+    radiosity: wgpu::Buffer,
+    places: wgpu::Buffer,
     chosen: PathList,
     capacity: u32,
     is_stale: bool,
@@ -38,6 +40,8 @@ impl IlluminationMap {
             surface_changes: buffer("lightfall::IlluminationMap::surface_changes", 4)?,
             surface_areas: buffer("lightfall::IlluminationMap::surface_areas", 4)?,
             counts: device::buffer(device, "lightfall::IlluminationMap::counts", 8, usage)?,
+            radiosity: buffer("lightfall::IlluminationMap::radiosity", 16)?,
+            places: buffer("lightfall::IlluminationMap::places", 4)?,
             chosen: PathList::with_room(device, a_frame)?,
             capacity,
             is_stale: true,
@@ -73,6 +77,17 @@ impl IlluminationMap {
     /// The same as it was gathered last, which what is shown goes towards.
     pub fn gathered(&self) -> &wgpu::Buffer {
         &self.gathered
+    }
+
+    /// All light that leaves the surface at each texel, per area, RGB in the unit frame: π times its radiance. Alpha: the photons
+    /// that it is taken from. Four `f32`. Of the present frame.
+    pub fn radiosity(&self) -> &wgpu::Buffer {
+        &self.radiosity
+    }
+
+    /// Of each texel one more than its place among those chosen, or 0; while rays are guided.
+    pub(crate) fn places(&self) -> &wgpu::Buffer {
+        &self.places
     }
 
     /// Of each texel a `u32`: how much the indirect light of its surface has changed since it was gathered, 0: it is not due.
@@ -112,6 +127,8 @@ impl IlluminationMap {
             &self.surface_changes,
             &self.surface_areas,
             &self.counts,
+            &self.radiosity,
+            &self.places,
         ];
         own.iter().map(|b| b.size()).sum::<u64>() + self.chosen.memory_use()
     }

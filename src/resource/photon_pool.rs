@@ -6,7 +6,7 @@ use crate::{Error, gpu as device};
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
 
-    /// Twin of `Impact` in `shaders/pass/photon_stream/impact.wgsl`.
+    /// Twin of `Impact` in `shaders/common/impact.wgsl`.
     #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
     #[repr(C)]
     pub(crate) struct Impact {

@@ -14,8 +14,8 @@ pub struct SurfaceRay {
     pub normal: u32,
     /// Unit.
     pub direction: [f32; 3],
-    /// 0.
-    pub pad: u32,
+    /// For whoever made it; tracers do not read it.
+    pub tag: u32,
 }
 
 impl SurfaceRay {
@@ -25,7 +25,7 @@ impl SurfaceRay {
             position: position.to_array(),
             normal: Photon::pack_unit_vector(normal),
             direction: direction.to_array(),
-            pad: 0,
+            tag: 0,
         }
     }
 }

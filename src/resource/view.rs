@@ -23,6 +23,8 @@ pub enum CapturePurpose {
     Candidate,
     /// An environment map: photons bounce off what it sees.
     EnvMap,
+    /// What a point of a surface sees: some 32 pixels to a side, of which a mean is taken.
+    Hemisphere,
 }
 
 /// Which instances a view wants.
@@ -103,6 +105,15 @@ impl CaptureView {
             axes.forward.extend(0.0),
             pixels_per_radian,
         )
+    }
+
+    /// The upper half of a square perspective view of half width 1 at distance 1; `size` pixels wide, half as high.
+    pub(crate) fn upper_half(purpose: CapturePurpose, mask: CaptureMask, eye: Vec3, axes: CubeFace, size: u32) -> Self {
+        let mut projection = perspective_matrix(1.0, 2.0);
+        // y from 0 to 1 at distance 1 fills the view: 2 y - 1.
+        projection.z_axis.y = 1.0;
+        let matrix = projection * view_matrix(eye, axes);
+        Self::new(purpose, mask, matrix, eye.extend(1.0), 0.5 * size as f32)
     }
 
     fn new(

@@ -5,6 +5,8 @@
 @group(0) @binding(2) var<storage, read_write> chosen: PathList;
 // Texels gathered, and those that wait
 @group(0) @binding(3) var<storage, read_write> counts: array<u32, 2>;
+// Of each texel one more than its place in the list, or 0
+@group(0) @binding(4) var<storage, read_write> places: array<u32>;
 
 fn candidate_count() -> u32 {
     return params.texel_count;
@@ -27,8 +29,11 @@ fn candidate_size(texel: u32) -> u32 {
 }
 
 fn take_candidate(texel: u32, at: u32) {
-    due[texel] = 0u;
+    if params.keeps_due == 0u {
+        due[texel] = 0u;
+    }
     chosen.paths[at] = texel;
+    places[texel] = at + 1u;
 }
 
 @compute @workgroup_size(256)

@@ -18,4 +18,13 @@ struct Params {
     // Invocations in a row of the dispatch over rays
     row: u32,
     sample_offset: u32,
+    // Photons that the light of a texel is taken from, if there are as many around
+    least_photons: u32,
+    // Share of the rays that go where indirect light comes from
+    guided: f32,
+    // 1: texels stay due until they are gathered
+    keeps_due: u32,
+    // Impacts in the pool, and invocations in a row of the dispatch over them
+    slot_count: u32,
+    slot_row: u32,
 }

@@ -1,11 +1,11 @@
 // What rays bring back: a workgroup a texel adds it up, in a fixed order.
-//   E = pi times the mean of L over rays as dense as the cosine, L = flux / (pi area) of the texel nearest to where a ray ends.
+//   E = mean of B / d over rays that are d times as dense as the cosine, B = pi L of the texel nearest to where a ray ends.
 
 @group(0) @binding(0) var<uniform> params: Params;
 @group(0) @binding(1) var<uniform> grid: SurfaceLightGrid;
 @group(0) @binding(2) var<storage, read> lights: array<SurfaceLight>;
 @group(0) @binding(3) var<storage, read> cells: array<u32>;
-@group(0) @binding(4) var<storage, read> flux: array<vec4u>;
+@group(0) @binding(4) var<storage, read> radiosity: array<vec4f>;
 @group(0) @binding(5) var<storage, read> chosen: PathList;
 @group(0) @binding(6) var<storage, read> rays: array<SurfaceRay>;
 @group(0) @binding(7) var<storage, read> hits: array<SurfaceHit>;
@@ -24,16 +24,17 @@ fn brought(index: u32) -> vec4f {
     let hit = hits[index];
     let is_hit = hit.kind == HIT_SURFACE || hit.kind == HIT_TENTATIVE;
     let is_back = is_hit && (hit.lobe & HIT_BACK) != 0u;
-    let nothing = vec4f(vec3f(0.0), f32(is_back));
+    let ray = rays[index];
+    let weight = bitcast<f32>(ray.tag);
+    let nothing = vec4f(vec3f(0.0), select(0.0, weight, is_back));
     if !is_hit || lobe_is_specular(hit.lobe) {
         return nothing;
     }
-    let ray = rays[index];
     let light = nearest_light(ray.position + hit.distance * ray.direction, octahedral_unpack(hit.normal));
-    if light == NO_LIGHT || lights[light].area <= 0.0 {
+    if light == NO_LIGHT {
         return nothing;
     }
-    return vec4f(vec3f(flux[light].xyz) * (params.flux_of_step / lights[light].area), nothing.a);
+    return vec4f(weight * radiosity[light].rgb, nothing.a);
 }
 
 @compute @workgroup_size(64)

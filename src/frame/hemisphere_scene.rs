@@ -1,0 +1,166 @@
+//! Texels whose light is gathered by the host's draws: which they are is chosen on the GPU and comes back some frames later,
+//! for views are made on the CPU.
+
+use super::Settings;
+use super::indirect_scene::PhotonPasses;
+use crate::Error;
+use crate::Timestamps;
+use crate::pass::{HemisphereGatherInputs, HemisphereGatherResources};
+use crate::read_back::ReadBackRing;
+use crate::resource::{
+    CaptureView, GatherShape, Geometry, HemispherePlace, Hemispheres, IlluminationMap, SurfaceLights,
+};
+use crate::scene::{SurfacePlace, UnitFrame};
+
+/// Allocated while light is gathered so.
+#[derive(Debug)]
+pub(super) struct HemisphereScene {
+    hemispheres: Hemispheres,
+    gather: HemisphereGatherResources,
+    ring: ReadBackRing,
+    /// Whether a list of texels is on its way: until it has come, none else are chosen.
+    is_under_way: bool,
+    /// Texels to gather in the next frame that is recorded.
+    texels: Vec<u32>,
+}
+
+/// What draws take.
+#[derive(Clone, Copy)]
+pub(super) struct DrawInputs<'a> {
+    pub(super) queue: &'a wgpu::Queue,
+    pub(super) passes: &'a PhotonPasses,
+    pub(super) geometry: &'a dyn Geometry,
+    pub(super) views: &'a [CaptureView],
+    pub(super) timestamps: Option<&'a Timestamps>,
+}
+
+impl HemisphereScene {
+    pub(super) fn new(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        settings: &Settings,
+        (shape, map): (GatherShape, &IlluminationMap),
+    ) -> Result<Self, Error> {
+        let own = &settings.illumination_maps;
+        let bytes = map.chosen().buffer().size();
+        Ok(Self {
+            hemispheres: Hemispheres::new(device, queue, (shape, own.hemisphere_size), own.gather.a_frame)?,
+            gather: HemisphereGatherResources::new(device)?,
+            ring: ReadBackRing::new(device, "lightfall::HemisphereScene::chosen", bytes)?,
+            is_under_way: false,
+            texels: Vec::new(),
+        })
+    }
+
+    /// Forgets what was to be gathered: texels are other ones.
+    pub(super) fn restart(&mut self) {
+        self.texels.clear();
+    }
+
+    /// The views of this frame: of the texels that were chosen, where these are now.
+    pub(super) fn plan(
+        &mut self,
+        queue: &wgpu::Queue,
+        frame: &UnitFrame,
+        places: &[SurfacePlace],
+    ) -> Result<Vec<CaptureView>, Error> {
+        let arrived = self.ring.take_words();
+        if arrived.is_some() || self.ring.take_lost() {
+            self.is_under_way = false;
+        }
+        if let Some(words) = arrived {
+            // Workgroups of a dispatch, how many there are, and they.
+            let count = words.get(3).map_or(0, |&n| n as usize);
+            self.texels = words.into_iter().skip(4).take(count).collect();
+        }
+        self.texels.retain(|&t| t as usize / 2 < places.len());
+        self.texels.truncate(self.hemispheres.capacity() as usize);
+        self.stand(queue, frame, places)
+    }
+
+    /// The views of given texels, at most [`HemisphereScene::capacity`].
+    pub(super) fn plan_texels(
+        &mut self,
+        queue: &wgpu::Queue,
+        (frame, places): (&UnitFrame, &[SurfacePlace]),
+        texels: std::ops::Range<u32>,
+    ) -> Result<Vec<CaptureView>, Error> {
+        self.texels = texels.collect();
+        self.stand(queue, frame, places)
+    }
+
+    fn stand(
+        &mut self,
+        queue: &wgpu::Queue,
+        frame: &UnitFrame,
+        places: &[SurfacePlace],
+    ) -> Result<Vec<CaptureView>, Error> {
+        // Two texels a place, the first on the side that its normal points to.
+        let of_texel = |&texel: &u32| {
+            let place = &places[texel as usize / 2];
+            let side = if texel % 2 == 0 { 1.0 } else { -1.0 };
+            HemispherePlace {
+                position: frame.point(place.position),
+                normal: (side * place.normal).as_vec3(),
+                texel,
+            }
+        };
+        let standing: Vec<_> = self.texels.iter().map(of_texel).collect();
+        self.hemispheres.set(queue, &standing)?;
+        Ok(self.hemispheres.views())
+    }
+
+    /// Records what was planned, and the return of the texels that were chosen now.
+    pub(super) fn record(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        inputs: &DrawInputs<'_>,
+        (lights, map): (&SurfaceLights, &IlluminationMap),
+    ) -> Result<(), Error> {
+        self.record_draws(encoder, inputs, (lights, map))?;
+        if !self.is_under_way {
+            self.ring.record(encoder, map.chosen().buffer());
+            self.is_under_way = true;
+        }
+        Ok(())
+    }
+
+    /// Records what was planned alone.
+    pub(super) fn record_draws(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        inputs: &DrawInputs<'_>,
+        (lights, map): (&SurfaceLights, &IlluminationMap),
+    ) -> Result<(), Error> {
+        let Some(pass) = &inputs.passes.hemisphere_gather else {
+            return Ok(());
+        };
+        let wanted = self.texels.len() * self.hemispheres.shape().views() as usize;
+        // Recorded twice after one `prepare`: the first has gathered them.
+        if inputs.views.len() != wanted {
+            return Ok(());
+        }
+        let gather_inputs = HemisphereGatherInputs {
+            queue: inputs.queue,
+            hemispheres: &self.hemispheres,
+            geometry: inputs.geometry,
+            views: inputs.views,
+            lights,
+            map,
+            timestamps: inputs.timestamps,
+        };
+        pass.record(encoder, &mut self.gather, &gather_inputs)?;
+        self.texels.clear();
+        Ok(())
+    }
+
+    /// Texels that are gathered at once.
+    pub(super) fn capacity(&self) -> u32 {
+        self.hemispheres.capacity()
+    }
+
+    pub(super) fn memory_use(&self) -> u64 {
+        let ring = ReadBackRing::size_in_bytes(self.ring.size());
+        self.hemispheres.memory_use() + self.gather.memory_use() + ring
+    }
+}
