@@ -63,7 +63,7 @@ enum Method {
     after_help = "Not available yet: --budget-ms, glTF skins."
 )]
 struct Arguments {
-    /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, plane, furnace, two-rooms, pillars,
+    /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, bumpy-floor, plane, furnace, two-rooms, pillars,
     /// penumbra, living-room, colonnade, glass-sphere, ring-occluder, dimpled-mirror, water, courtyard)
     scene: String,
     /// Width in pixels

@@ -187,6 +187,11 @@ impl<'a> Offline<'a> {
         wait(device)
     }
 
+    /// Has the next frame gather all of an illumination map anew.
+    pub(crate) fn refill(&mut self) {
+        self.is_first = true;
+    }
+
     /// Replaces the scene by the same one at another time: instances and lights may have moved.
     pub(crate) fn set_scene(&mut self, scene: Scene) -> Result<(), Error> {
         for (index, instance) in scene.instances.iter().enumerate() {

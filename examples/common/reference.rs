@@ -6,7 +6,7 @@ use lightfall::reference::{
     Emitters, PathEstimate, PathTracer, PathTracerInputs, PathTracerResources, PathTracerSettings,
 };
 use lightfall::resource::{BvhGeometry, BvhGeometryConfig, Radiance};
-use lightfall::scene::{Scene, SceneSummary, UnitFrame};
+use lightfall::scene::{Camera, Scene, SceneSummary, UnitFrame};
 use lightfall::{Error, Timestamps};
 
 /// The preset that is no `Settings`.
@@ -54,6 +54,12 @@ impl<'a> Reference<'a> {
             settings: *settings,
             size,
         })
+    }
+
+    /// Begins anew with another camera.
+    pub(crate) fn look(&mut self, camera: Camera) {
+        self.scene.cameras[self.camera] = camera;
+        self.resources.restart();
     }
 
     /// Traces one more path for each pixel and waits for them.

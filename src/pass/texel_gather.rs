@@ -156,7 +156,7 @@ impl Default for TexelGatherSettings {
             threshold: 0.001,
             blend: 0.3,
             least_photons: 0,
-            guided: 0.0,
+            guided: 0.5,
         }
     }
 }

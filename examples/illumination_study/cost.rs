@@ -1,26 +1,18 @@
-//! What a frame costs by the share of the scene that changes in it: the table and the plot of `docs/methods.md`.
-//!
-//! ```text
-//! cargo run --release --example illumination_study -- --plot docs/illumination_cost.svg
-//! ```
+//! What a frame costs by the share of the scene that changes in it.
 //!
 //! The sample `pillars` with eight bulbs of the same flux, of which none to all move a little in each frame: that share of the
 //! photons then goes other ways. Budgets are high enough that everything is followed at once. Times are of whole frames on the
 //! wall, medians of all frames; paths and rays are counted.
 
-mod common;
-
-use clap::Parser;
-use common::adapter::{Gpu, Wishes};
-use common::arguments;
-use common::clock::median;
-use common::offline::{self, Component, Offline};
+use crate::Arguments;
+use crate::common::adapter::Gpu;
+use crate::common::clock::median;
+use crate::common::offline::{self, Component, Offline};
 use lightfall::frame::Settings;
 use lightfall::glam::DVec3;
 use lightfall::scene::{Light, LightKind, Scene, samples};
 use lightfall::{Error, read_buffer_blocking};
 use plotters::prelude::*;
-use std::path::PathBuf;
 use std::time::Instant;
 
 const BULBS: usize = 8;
@@ -35,23 +27,6 @@ const WAYS: [(&str, &[(&str, &str)]); 3] = [
     ("illumination maps", &[("indirect.method", "illumination-maps")]),
 ];
 
-/// Prints what frames cost by how much of a scene changes.
-#[derive(Parser)]
-struct Arguments {
-    /// Width and height in pixels
-    #[arg(long, default_value_t = 128)]
-    size: u32,
-    /// Frames of each point
-    #[arg(long, default_value_t = 12)]
-    frames: usize,
-    /// Plot to write, SVG
-    #[arg(long)]
-    plot: Option<PathBuf>,
-    /// Part of the adapter's name or backend
-    #[arg(long)]
-    adapter: Option<String>,
-}
-
 /// Of a frame.
 struct Cost {
     milliseconds: f64,
@@ -61,28 +36,16 @@ struct Cost {
     texels: f64,
 }
 
-fn main() {
-    let arguments: Arguments = arguments::parse("illumination_study");
-    if let Err(message) = run(&arguments) {
-        eprintln!("illumination_study: {message}");
-        std::process::exit(2);
-    }
-}
-
-fn run(arguments: &Arguments) -> Result<(), String> {
-    let wishes = Wishes {
-        large_buffers: true,
-        ..Wishes::default()
-    };
-    let gpu = Gpu::open(arguments.adapter.as_deref(), wishes)?;
-    println!("{}, {} × {} pixels\n", gpu.describe(), arguments.size, arguments.size);
-    println!("| share of the light that moves | way | paths a frame | texels a frame | ms a frame |");
+/// Prints the table, and draws it if there is a file to.
+pub(crate) fn table(gpu: &Gpu, arguments: &Arguments) -> Result<(), String> {
+    println!("{} × {} pixels\n", arguments.size, arguments.size);
+    println!("| light that moves | way | paths a frame | texels a frame | ms a frame |");
     println!("|---|---|---|---|---|");
     let mut curves = vec![Vec::new(); WAYS.len()];
     for moving in 0..=BULBS {
         let share = moving as f64 / BULBS as f64;
         for ((name, overrides), curve) in WAYS.iter().zip(&mut curves) {
-            let cost = measure(arguments, &gpu, moving, overrides).map_err(|e| e.to_string())?;
+            let cost = measure(arguments, gpu, moving, overrides).map_err(|e| e.to_string())?;
             println!(
                 "| {:.1} % | {name} | {:.0} | {:.0} | {:.0} |",
                 100.0 * share,
@@ -93,10 +56,10 @@ fn run(arguments: &Arguments) -> Result<(), String> {
             curve.push((100.0 * share, cost.milliseconds));
         }
     }
-    if let Some(path) = &arguments.plot {
-        plot(path, &curves).map_err(|e| format!("{}: {e}", path.display()))?;
+    match &arguments.plot {
+        Some(path) => plot(path, &curves).map_err(|e| format!("{}: {e}", path.display())),
+        None => Ok(()),
     }
-    gpu.check()
 }
 
 /// The hall with so many bulbs, of which the first few stand to one side or the other.
