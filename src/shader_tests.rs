@@ -502,7 +502,11 @@ fn layouts(module: &str) -> Vec<&'static [Slot]> {
         "MeshGeometry" => vec![&mesh_geometry::SCENE_SLOTS, &mesh_geometry::MATERIAL_SLOTS],
         "PhotonEmitter" => vec![&photon_emitter::SLOTS, &photon_emitter::SPREAD_SLOTS],
         "PhotonEmitter::listed" => vec![&photon_emitter::SLOTS, &photon_walk::LIST_SLOTS],
-        "PhotonEmitter::at_targets" => vec![&photon_emitter::SLOTS, &photon_emitter::SPREAD_SLOTS],
+        "PhotonEmitter::at_targets" => vec![
+            &photon_emitter::SLOTS,
+            &photon_emitter::SPREAD_SLOTS,
+            &photon_walk::LIST_SLOTS,
+        ],
         "ImageSpaceTracer" => vec![
             &photon_walk::SLOTS,
             &image_space_tracer::SLOTS,

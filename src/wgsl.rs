@@ -74,7 +74,9 @@ pub(crate) const PHOTON_EMITTER_LISTED: &str = compose![
 
 pub(crate) const PHOTON_EMITTER_AT_TARGETS: &str = compose![
     "pass/photon_emitter/emit_at_targets.wgsl",
+    "pass/photon_emitter/emit_listed_at_targets.wgsl",
     "pass/photon_emitter/first_hit.wgsl",
+    "common/path_list.wgsl",
     "common/photon_targets.wgsl",
     "common/light.wgsl",
     "common/polygon.wgsl",

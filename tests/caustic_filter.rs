@@ -2,13 +2,14 @@
 
 mod common;
 
+use common::rooms::bulb;
 use common::statistics::Random;
-use common::{Component, Gpu, assert_no_errors, gpu, offline};
+use common::{Component, Gpu, Offline, assert_no_errors, gpu, offline};
 use lightfall::frame::Settings;
 use lightfall::glam::{DAffine3, DMat3, DVec3};
 use lightfall::pass::*;
 use lightfall::resource::*;
-use lightfall::scene::{Camera, Projection, SceneBounds, UnitFrame, samples};
+use lightfall::scene::{Camera, Light, Projection, Scene, SceneBounds, UnitFrame, samples};
 use lightfall::{Error, read_buffer_blocking, read_rgba32float_blocking, wgpu};
 
 const SIZE: [u32; 2] = [96, 64];
@@ -281,6 +282,127 @@ fn splatted_or_filtered_caustics_are_as_bright() {
     let (splatted, filtered) = (mean("splatting"), mean("filter"));
     println!("{splatted:.5} splatted, {filtered:.5} filtered");
     assert!((filtered / splatted - 1.0).abs() < 0.05);
+    assert_no_errors(&gpu);
+}
+
+/// Caustics of the glass ball, in so many rounds.
+fn in_rounds<'a>(gpu: &'a Gpu, scene: &Scene, rounds: u32, overrides: &[(&str, &str)]) -> Offline<'a> {
+    let mut settings = Settings {
+        photons: 10_000,
+        env_map_size: 32,
+        ..Settings::fast()
+    };
+    settings.caustic.photons = 20_000;
+    settings.caustic.rounds = rounds;
+    for (key, value) in overrides {
+        settings.set(key, value).unwrap();
+    }
+    let mut offline = Offline::new(gpu, scene.clone(), &settings, 0, [64, 64], Component::Caustic).unwrap();
+    if offline.renderer.env_maps().is_some() {
+        // Maps that find better places have all traced anew.
+        let centers = [DVec3::new(0.0, 2.0, 0.0), DVec3::new(1.0, 0.5, 1.0)];
+        offline.renderer.set_env_map_centers(&gpu.queue, &centers).unwrap();
+    }
+    offline
+}
+
+/// So many frames on.
+fn after(offline: &mut Offline<'_>, frames: u32) -> Vec<[f32; 3]> {
+    for _ in 0..frames {
+        offline.render_frame(None).unwrap();
+    }
+    offline.read().unwrap()
+}
+
+/// Either tracer with either way to the pixels.
+fn ways() -> Vec<[(&'static str, &'static str); 2]> {
+    let tracers: &[_] = if cfg!(feature = "bvh") {
+        &["image-space", "bvh"]
+    } else {
+        &["image-space"]
+    };
+    let methods = ["splatting", "filter"];
+    let all = tracers
+        .iter()
+        .flat_map(|&t| methods.map(|m| [("tracer.kind", t), ("caustic.method", m)]));
+    all.collect()
+}
+
+#[test]
+fn in_rounds_a_picture_is_what_it_is_without_from_the_first_frame_on() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::glass_sphere(0.0);
+    for way in ways() {
+        let [mut all, mut parts] = [1, 8].map(|rounds| in_rounds(&gpu, &scene, rounds, &way));
+        let picture = after(&mut all, 1);
+        assert!(picture.iter().any(|p| p[0] > 0.0));
+        assert!(after(&mut parts, 1) == picture, "{way:?}: first frame");
+        for frames in [1, 7] {
+            assert!(
+                after(&mut all, frames) == picture && after(&mut parts, frames) == picture,
+                "{way:?}"
+            );
+        }
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn in_rounds_light_follows_within_as_many_frames_and_a_part_of_it_in_each() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::glass_sphere(0.0);
+    let mut moved = scene.clone();
+    bulb(&mut moved, 0).x += 0.4;
+    let paths = |offline: &Offline<'_>| {
+        let photons = offline.renderer.caustic_photons().unwrap();
+        let mut all: Vec<Photon> = read_buffer_blocking(&gpu.device, &gpu.queue, photons.buffer()).unwrap();
+        all.truncate(photons.count() as usize);
+        all
+    };
+    let others = |a: &[Photon], b: &[Photon]| a.iter().zip(b).filter(|(a, b)| a != b).count() as f64;
+    for way in ways() {
+        let mut fresh = in_rounds(&gpu, &moved, 1, &way);
+        let new = after(&mut fresh, 1);
+        let mut offline = in_rounds(&gpu, &scene, 8, &way);
+        let old = after(&mut offline, 3);
+        let before = paths(&offline);
+        let all = others(&before, &paths(&fresh));
+        offline.set_scene(moved.clone()).unwrap();
+        for frame in 1..=8 {
+            let picture = after(&mut offline, 1);
+            let share = others(&before, &paths(&offline)) / all;
+            assert!(
+                (share - f64::from(frame) / 8.0).abs() < 0.02,
+                "{way:?}, frame {frame}: {share}"
+            );
+            assert_eq!(picture == new, frame == 8, "{way:?}: frame {frame}");
+            if frame == 4 {
+                // Halfway from one picture to the other, everywhere.
+                let sum = |of: &dyn Fn(usize) -> f32| (0..new.len()).map(|i| f64::from(of(i))).sum::<f64>();
+                let change = sum(&|i| (new[i][0] - old[i][0]).abs());
+                let off = sum(&|i| (picture[i][0] - 0.5 * (new[i][0] + old[i][0])).abs()) / change;
+                println!("{way:?}: halfway but for {off:.4} of the change");
+                assert!(off < 0.1);
+            }
+        }
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn rounds_start_anew_with_another_number_of_lights_and_other_photons() {
+    let Some(gpu) = gpu() else { return };
+    let mut scene = samples::glass_sphere(0.0);
+    let mut offline = in_rounds(&gpu, &scene, 8, &[]);
+    after(&mut offline, 2);
+    scene
+        .lights
+        .push(Light::point(DVec3::new(1.0, 3.0, 1.0), 20.0, [1.0, 0.5, 0.2]));
+    offline.set_scene(scene.clone()).unwrap();
+    assert!(after(&mut offline, 1) == after(&mut in_rounds(&gpu, &scene, 1, &[]), 1));
+    // Each accumulated frame has its own.
+    let [all, parts] = [1, 8].map(|rounds| after(&mut in_rounds(&gpu, &scene, rounds, &[("frames", "3")]), 3));
+    assert!(all == parts);
     assert_no_errors(&gpu);
 }
 

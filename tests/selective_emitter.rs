@@ -172,6 +172,52 @@ fn photons_of_a_light_that_moves_are_traced_anew_within_the_budget_and_no_others
 }
 
 #[test]
+fn photons_of_a_light_that_grows_brighter_are_traced_anew_and_no_others() {
+    let Some(gpu) = gpu() else { return };
+    let settings = settings(&[("selective.budget", "12000")]);
+    let mut scene = rooms(0.0);
+    let mut offline = offline(&gpu, &scene, &settings);
+    let before = read_photons(&gpu, &offline);
+    let half = 6000;
+    scene.lights[0].intensity *= 1.2;
+    offline.set_scene(scene.clone()).unwrap();
+    let mut numbers = Vec::new();
+    for _ in 0..3 {
+        offline.render_frame(None).unwrap();
+        let paths = chosen(&gpu, &offline);
+        assert!(paths.iter().all(|&p| p < half), "of the other light");
+        numbers.push(paths.len());
+    }
+    println!("traced anew: {numbers:?}");
+    assert_eq!(numbers, [half as usize, 0, 0]);
+    // As many as before go the same ways, and carry what the lights have.
+    for (slot, (was, is)) in before.iter().zip(&read_photons(&gpu, &offline)).enumerate() {
+        let (path, mut expected) = (slot as u32 % 12_000, *was);
+        if was.state & 3 != 0 && path < half {
+            expected.flux = is.flux;
+            let ratios = was
+                .flux
+                .iter()
+                .zip(is.flux)
+                .filter(|(w, _)| **w > 0.0)
+                .map(|(w, i)| i / w);
+            assert!(ratios.into_iter().all(|r| (r - 1.2).abs() < 1e-5), "slot {slot}");
+        }
+        assert!(bits(&[expected]) == bits(&[*is]), "slot {slot}");
+    }
+    // Much brighter: divided anew, as at the start.
+    scene.lights[0].intensity *= 10.0;
+    offline.set_scene(scene.clone()).unwrap();
+    offline.render_frame(None).unwrap();
+    assert_eq!(counts(&gpu, &offline), [0; 4], "all at once");
+    let of_near = |photons: &[Photon]| photons[..12_000].iter().filter(|p| p.light() == 0).count();
+    let fresh = read_photons(&gpu, &self::offline(&gpu, &scene, &settings));
+    let now = read_photons(&gpu, &offline);
+    assert!(of_near(&now) > 9000 && of_near(&now) == of_near(&fresh));
+    assert_no_errors(&gpu);
+}
+
+#[test]
 fn a_small_budget_takes_what_has_changed_most_first_and_all_in_the_end() {
     let Some(gpu) = gpu() else { return };
     // Less than a group.

@@ -38,8 +38,12 @@ impl ShadowPasses {
 
 impl DirectScene {
     pub(super) fn new(device: &wgpu::Device, settings: &Settings, lights: &[Light]) -> Result<Self, Error> {
+        let mut own = Lights::new(device)?;
+        if settings.selects_photons() {
+            own.keep_division();
+        }
         Ok(Self {
-            lights: Lights::new(device)?,
+            lights: own,
             shadow_maps: ShadowMaps::new(device, lights, settings.shadow_map_size)?,
             layers: ShadowMaps::layers(lights),
             capture: ShadowMapCaptureResources::new(device, settings.shadow_map_size)?,

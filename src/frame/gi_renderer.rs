@@ -362,7 +362,7 @@ impl GiRenderer {
         if let Some(indirect) = &mut self.indirect {
             let sorted = [Stage::PhotonGrid, Stage::GlossyLight].map(|stage| plan.is_on(stage));
             indirect.sort_photons(device, sorted)?;
-            indirect.split_caustics(device, settings, plan.is_on(Stage::CausticMap))?;
+            indirect.split_caustics((device, queue), settings, plan.is_on(Stage::CausticMap))?;
         }
         Ok(())
     }

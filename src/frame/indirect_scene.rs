@@ -208,19 +208,22 @@ impl IndirectScene {
     /// Gives caustics photons of their own, or none.
     pub(super) fn split_caustics(
         &mut self,
-        device: &wgpu::Device,
+        gpu: (&wgpu::Device, &wgpu::Queue),
         settings: &Settings,
         is_wanted: bool,
     ) -> Result<(), Error> {
         if !is_wanted {
             self.caustics = None;
         } else if self.caustics.is_none() {
-            let kind = settings.caustic_tracer();
-            let traced = TracedPhotons::new(
+            let (device, kind) = (gpu.0, settings.caustic_tracer());
+            let mut traced = TracedPhotons::new(
                 device,
                 (settings.caustic.photons, settings.bounces),
                 (PhotonMap::Caustic, kind),
             )?;
+            if settings.caustic.rounds > 1 {
+                traced.trace_in_rounds(gpu, settings.caustic.rounds)?;
+            }
             self.caustics = Some((traced, PhotonTargets::new(device)?));
         }
         let is_split = self.caustics.is_some();
@@ -265,9 +268,12 @@ impl IndirectScene {
         &self.global.photons
     }
 
-    /// Has all photons traced as a whole in the next frame, even if they stay until their way changes.
+    /// Has all photons traced as a whole in the next frame, even if they stay until their way changes or their turn comes.
     pub(super) fn retrace(&mut self) {
         self.global.retrace();
+        if let Some((caustics, _)) = &mut self.caustics {
+            caustics.retrace();
+        }
     }
 
     /// Has all light at texels forgotten and gathered anew.

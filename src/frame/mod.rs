@@ -13,6 +13,7 @@ mod indirect_scene;
 mod indirect_view;
 #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
 mod photon_feeder;
+mod photon_rounds;
 mod plan;
 mod ray_tracers;
 mod recapture;

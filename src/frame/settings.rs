@@ -245,8 +245,13 @@ pub enum CausticMethod {
 /// and are as wide as they lie apart on the screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CausticSettings {
-    /// Photons emitted a frame, beside all others. 0: caustics are as blurred as other indirect light.
+    /// Photons in all, beside those of other light. 0: caustics are as blurred as other indirect light.
     pub photons: u32,
+    /// Frames, 1 or more, over which all of them are traced anew, a part in each (Larsen 2004, chapter 12: 8). 1: all in every
+    /// frame. More cost less in proportion, and light follows a change within so many. All are traced at once where there are
+    /// none yet, where the unit frame or the number of lights is another one, where environment maps that they are traced
+    /// through have other places, and in frames that are accumulated.
+    pub rounds: u32,
     /// Photons under a kernel, above 0. Fewer are sharper and noisier.
     pub kernel_photons: f32,
     /// How they come to pixels.
@@ -261,6 +266,7 @@ impl Default for CausticSettings {
     fn default() -> Self {
         Self {
             photons: 100_000,
+            rounds: 1,
             kernel_photons: 40.0,
             method: CausticMethod::default(),
             filter: CausticFilterSettings::default(),
@@ -924,6 +930,7 @@ const KNOBS: &[Knob] = &[
     ),
     field!("caustic.photons", "0 to 100000000", caustic.photons, |v| v
         <= 100_000_000),
+    field!("caustic.rounds", "1 or more: frames", caustic.rounds, |v| v >= 1),
     field!(
         "caustic.kernel_photons",
         "above 0: photons under a kernel",

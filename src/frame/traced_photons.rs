@@ -1,6 +1,7 @@
 //! A photon map on its way from the lights to the last surface, by whichever tracers the settings choose.
 
 use super::indirect_scene::{PhotonInputs, PhotonPasses};
+use super::photon_rounds::PhotonRounds;
 use super::selective_photons::{OnRetraced, Retraced, SelectivePhotons};
 use super::{Settings, TracerKind};
 use crate::Error;
@@ -29,6 +30,8 @@ pub(super) struct TracedPhotons {
     lost: Option<PathList>,
     /// While photons stay until their way changes.
     selective: Option<Box<SelectivePhotons>>,
+    /// While a part of them is traced a frame.
+    rounds: Option<PhotonRounds>,
 }
 
 /// Which part of the walk is recorded.
@@ -72,6 +75,7 @@ impl TracedPhotons {
             lost: is_shared.then(|| PathList::new(device, &photons)).transpose()?,
             kind,
             selective: None,
+            rounds: None,
             photons,
         })
     }
@@ -82,10 +86,19 @@ impl TracedPhotons {
         Ok(())
     }
 
+    /// Has a part of them traced anew in each of so many frames. Not for a hybrid.
+    pub(super) fn trace_in_rounds(&mut self, gpu: (&wgpu::Device, &wgpu::Queue), rounds: u32) -> Result<(), Error> {
+        self.rounds = Some(PhotonRounds::new(gpu, &self.photons, rounds)?);
+        Ok(())
+    }
+
     /// Has all of them traced in the next frame.
     pub(super) fn retrace(&mut self) {
         if let Some(selective) = &mut self.selective {
             selective.restart();
+        }
+        if let Some(rounds) = &mut self.rounds {
+            rounds.restart();
         }
     }
 
@@ -105,16 +118,24 @@ impl TracedPhotons {
     /// Forgets lights and shadow maps that are no more.
     pub(super) fn renew_emitter(&mut self, device: &wgpu::Device) -> Result<(), Error> {
         self.emitter = PhotonEmitterResources::new(device)?;
+        if let Some(rounds) = &mut self.rounds {
+            rounds.restart();
+        }
         Ok(())
     }
 
-    /// Records the emission and the walk: of all photons, or of those whose way has changed.
+    /// Records the emission and the walk: of all photons, of those whose turn it is, or of those whose way has changed.
     pub(super) fn record(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
         passes: &PhotonPasses,
         inputs: &WalkInputs<'_>,
     ) -> Result<(), Error> {
+        if let Some(mut rounds) = self.rounds.take() {
+            let recorded = rounds.record(encoder, passes, self, inputs);
+            self.rounds = Some(rounds);
+            return recorded;
+        }
         self.record_selected(encoder, passes, inputs, &mut |_, _, _| Ok(()))
     }
 
@@ -234,7 +255,9 @@ impl TracedPhotons {
         #[cfg(feature = "bvh")]
         let uniforms = uniforms + self.bvh.memory_use();
         let lost = self.lost.as_ref().map_or(0, PathList::memory_use);
-        let photons = self.photons.memory_use() + self.selective.as_ref().map_or(0, |s| s.memory_use());
+        let selective = self.selective.as_ref().map_or(0, |s| s.memory_use());
+        let rounds = self.rounds.as_ref().map_or(0, PhotonRounds::memory_use);
+        let photons = self.photons.memory_use() + selective + rounds;
         [photons, lost, uniforms]
     }
 }

@@ -88,6 +88,7 @@ pub struct PhotonEmitter {
     /// Of the list of some photons.
     list_layout: wgpu::BindGroupLayout,
     emit_listed: wgpu::ComputePipeline,
+    emit_listed_at_targets: wgpu::ComputePipeline,
 }
 
 /// Uniforms and bind groups.
@@ -163,6 +164,12 @@ impl PhotonEmitter {
                 "emit_listed_photons",
                 &[&layout, &list_layout],
             ),
+            emit_listed_at_targets: pipeline(
+                "lightfall::PhotonEmitter::emit_listed_at_targets",
+                wgsl::PHOTON_EMITTER_AT_TARGETS,
+                "emit_listed_at_targets",
+                &[&layout, &spread_layout, &list_layout],
+            ),
             layout,
             spread_layout,
             list_layout,
@@ -177,7 +184,6 @@ impl PhotonEmitter {
         inputs: &PhotonEmitterInputs<'_>,
     ) {
         let (group, groups) = self.prepare(resources, inputs);
-        let label = "lightfall::PhotonEmitter";
         let (pipeline, spread) = match inputs.spread {
             PhotonSpread::Guided(guiding) if guiding.share() > 0.0 => {
                 (&self.emit_guided, Some(guiding.tables.emission()))
@@ -185,11 +191,8 @@ impl PhotonEmitter {
             PhotonSpread::Even | PhotonSpread::Guided(_) => (&self.emit, None),
             PhotonSpread::Targets(targets) => (&self.emit_at_targets, Some(targets.buffer())),
         };
-        let spread_group = spread.map(|buffer| {
-            let bound = [buffer.into()];
-            resources.groups.get(&self.device, label, &self.spread_layout, &bound)
-        });
-        let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
+        let spread_group = spread.map(|buffer| self.spread_group(resources, buffer));
+        let mut pass = device::compute_pass(encoder, "lightfall::PhotonEmitter", inputs.timestamps);
         pass.set_pipeline(pipeline);
         if let Some(spread_group) = &spread_group {
             pass.set_bind_group(1, spread_group, &[]);
@@ -198,7 +201,8 @@ impl PhotonEmitter {
         pass.dispatch_workgroups(groups[0], groups[1], 1);
     }
 
-    /// Records the emission of some photons alone, over what is there: evenly spread, whatever `inputs` say.
+    /// Records the emission of some photons alone, over what is there: towards targets, or evenly spread where `inputs` say
+    /// anything else.
     pub fn record_listed(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -212,11 +216,30 @@ impl PhotonEmitter {
         let listed = resources
             .list_groups
             .get(&self.device, label, &self.list_layout, &bound);
+        let targets = match inputs.spread {
+            PhotonSpread::Targets(targets) => Some(self.spread_group(resources, targets.buffer())),
+            PhotonSpread::Even | PhotonSpread::Guided(_) => None,
+        };
         let mut pass = device::compute_pass(encoder, label, inputs.timestamps);
-        pass.set_pipeline(&self.emit_listed);
+        match &targets {
+            Some(targets) => {
+                pass.set_pipeline(&self.emit_listed_at_targets);
+                pass.set_bind_group(1, targets, &[]);
+                pass.set_bind_group(2, &listed, &[]);
+            }
+            None => {
+                pass.set_pipeline(&self.emit_listed);
+                pass.set_bind_group(1, &listed, &[]);
+            }
+        }
         pass.set_bind_group(0, &group, &[]);
-        pass.set_bind_group(1, &listed, &[]);
         pass.dispatch_workgroups_indirect(list.buffer(), 0);
+    }
+
+    /// What spreads them, bound.
+    fn spread_group(&self, resources: &mut PhotonEmitterResources, buffer: &wgpu::Buffer) -> wgpu::BindGroup {
+        let (label, layout) = ("lightfall::PhotonEmitter", &self.spread_layout);
+        resources.groups.get(&self.device, label, layout, &[buffer.into()])
     }
 
     /// Uniform and bindings, and workgroups for all photons.

@@ -13,6 +13,10 @@ pub const MAX_LIGHTS: usize = 64;
 /// by flux.
 const EVEN_SHARE: f64 = 0.25;
 
+/// How many times as many photons a light may have as its flux asks for, or as few, while the division among the lights is
+/// kept.
+const DIVISION_TOLERANCE: f64 = 1.5;
+
 /// Direct light of a lamp of more triangles than this is that of the rectangle that stands for it.
 pub const MAX_DIRECT_POLYGONS: usize = 16;
 
@@ -87,6 +91,9 @@ pub struct Lights {
     written: Vec<gpu::LightRecord>,
     polygons: wgpu::Buffer,
     written_polygons: Vec<gpu::Polygon>,
+    /// Photons of each of the sources.
+    division: Vec<u32>,
+    keeps_division: bool,
 }
 
 impl Lights {
@@ -103,7 +110,16 @@ impl Lights {
             written: Vec::new(),
             polygons: polygon_buffer(gpu, 1)?,
             written_polygons: Vec::new(),
+            division: Vec::new(),
+            keeps_division: false,
         })
+    }
+
+    /// Has photons divided as they were before from now on, while there are as many lights and no light has more than one and a
+    /// half times the photons that its flux asks for, or fewer by as much: for photons that stay from frame to frame. What a
+    /// light's photons carry always adds up to its flux.
+    pub fn keep_division(&mut self) {
+        self.keeps_division = true;
     }
 
     /// Uploads what lights this frame. `photon_count` photons are divided among them: three quarters in proportion to flux, one
@@ -131,7 +147,10 @@ impl Lights {
         let all = sources.all();
         let suns_from = sources.lights.len();
         let lamps_from = suns_from + sources.suns.len();
-        let counts = divide_photons(&fluxes(frame, &all), photon_count);
+        let mut counts = divide_photons(&fluxes(frame, &all), photon_count);
+        if self.keeps_division && is_near(&self.division, &counts) {
+            counts.clone_from(&self.division);
+        }
         let (mut records, mut polygons) = (Vec::with_capacity(found), Vec::new());
         let (mut first_layer, mut first_photon) = (0, 0);
         for (index, (light, &count)) in all.iter().zip(&counts).enumerate() {
@@ -161,6 +180,7 @@ impl Lights {
             queue.write_buffer(&self.buffer, 0, bytemuck::cast_slice(&records));
             self.written = records;
         }
+        self.division = counts;
         Ok(())
     }
 
@@ -335,6 +355,13 @@ pub(super) fn divide_photons(flux: &[f64], total: u32) -> Vec<u32> {
         .collect()
 }
 
+/// Whether a division of photons is of as many as another one, and within the tolerance of it.
+fn is_near(division: &[u32], wanted: &[u32]) -> bool {
+    let near = |(&a, &b): (&u32, &u32)| f64::from(a.max(b)) <= DIVISION_TOLERANCE * f64::from(a.min(b));
+    let sum = |counts: &[u32]| counts.iter().sum::<u32>();
+    division.len() == wanted.len() && sum(division) == sum(wanted) && division.iter().zip(wanted).all(near)
+}
+
 /// `None` for an environment. Polygons are left to be added.
 fn record(
     frame: &UnitFrame,
@@ -458,5 +485,23 @@ mod tests {
         };
         let counts = divide_photons(&fluxes(&frame(), &[sky.clone(), light(1.0), sky, light(3.0)]), 1000);
         assert_eq!(counts, [0, 313, 0, 687]);
+    }
+
+    #[test]
+    fn a_division_is_near_where_no_light_is_off_by_more_than_half() {
+        assert!(is_near(&[500, 500, 0], &[600, 400, 0]));
+        assert!(is_near(&[600, 400], &[400, 600]));
+        for (kept, wanted) in [
+            (&[500, 500][..], &[700, 300][..]),
+            // One that begins or ends to shine.
+            (&[1000, 0], &[999, 1]),
+            (&[999, 1], &[1000, 0]),
+            // Others in number.
+            (&[500, 500], &[500, 501]),
+            (&[1000], &[500, 500]),
+            (&[], &[1000]),
+        ] {
+            assert!(!is_near(kept, wanted), "{kept:?}, {wanted:?}");
+        }
     }
 }

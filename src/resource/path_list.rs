@@ -19,6 +19,12 @@ pub(crate) mod gpu {
 /// Bytes before the first path.
 const HEADER_BYTES: u64 = std::mem::offset_of!(gpu::PathList, paths) as u64;
 
+/// What stands before so many paths. Twin of `path_list_workgroups`.
+pub(super) fn header(count: u32) -> [u32; 4] {
+    let [x, y] = device::dispatch_size(count.div_ceil(64));
+    [x, y, 1, count]
+}
+
 /// Paths that a shader lists together. Twin of `BLOCK` in `shaders/pass/image_space_tracer/list_lost.wgsl`.
 pub(crate) const BLOCK: u32 = 64;
 

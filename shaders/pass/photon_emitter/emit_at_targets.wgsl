@@ -41,12 +41,8 @@ fn emit_at_targets(light: Light, light_index: u32, sequence_index: u32, count: u
     return photon_on_ray(light_index, ray, aim.density, all * (density / (f32(count) * aim.density)), 0u);
 }
 
-@compute @workgroup_size(64)
-fn emit_photons_at_targets(@builtin(global_invocation_id) id: vec3u) {
-    let index = id.y * params.row + id.x;
-    if id.x >= params.row || index >= params.photon_count {
-        return;
-    }
+// Any of them; of one that no light sends, nothing.
+fn emit_photon_at_targets(index: u32) {
     var light_index = 0u;
     while light_index + 1u < params.light_count && index >= targets.ranges[light_index].x + targets.ranges[light_index].y {
         light_index++;
@@ -62,5 +58,13 @@ fn emit_photons_at_targets(@builtin(global_invocation_id) id: vec3u) {
         photons[index] = start_at_targets(light, light_index, sequence_index, range.y);
     } else {
         photons[index] = emit_at_targets(light_within(light, sequence_index), light_index, sequence_index, range.y);
+    }
+}
+
+@compute @workgroup_size(64)
+fn emit_photons_at_targets(@builtin(global_invocation_id) id: vec3u) {
+    let index = id.y * params.row + id.x;
+    if id.x < params.row && index < params.photon_count {
+        emit_photon_at_targets(index);
     }
 }
