@@ -647,6 +647,7 @@ pub(crate) const TEXEL_GATHER_DUE: &str = compose![
 pub(crate) const TEXEL_GATHER_CHOICE: &str = compose![
     "pass/texel_gather/choose_texels.wgsl",
     "pass/texel_gather/params.wgsl",
+    "common/surface_light.wgsl",
     "common/choose_most.wgsl",
     "common/path_list.wgsl",
 ];

@@ -157,7 +157,8 @@ impl<'a> Offline<'a> {
             self.renderer.fill_illumination_map(&scene_inputs)?;
             self.is_first = false;
             if self.renderer.settings().illumination_maps.method != TexelGatherMethod::Rays {
-                self.renderer.gather_illumination_map(queue, &mut self.geometry)?;
+                self.renderer
+                    .gather_illumination_map_blocking(queue, &mut self.geometry)?;
                 return self.render_frame(timestamps);
             }
         }

@@ -9,25 +9,29 @@ use crate::common::clock::median;
 use crate::common::offline::{self, Component, Offline};
 use crate::common::reference::Reference;
 use lightfall::frame::{IndirectMethod, Settings};
-use lightfall::glam::{DAffine3, DVec3};
+use lightfall::glam::{DAffine3, DVec3, Vec3};
 use lightfall::read_buffer_blocking;
 use lightfall::reference::{PathComponent, PathTracerSettings};
-use lightfall::scene::{Camera, Projection, Scene, SurfacePlace, samples};
+use lightfall::scene::{Camera, Projection, Scene, samples};
+use std::f64::consts::{FRAC_PI_2, PI};
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::time::Instant;
 
-const BOUNCES: u32 = 3;
-
 /// Pixels of the picture of a point: each adds to the same mean.
-const POINT_SIZE: u32 = 32;
+const POINT_SIZE: u32 = 64;
 
 type Overrides = &'static [(&'static str, &'static str)];
 
 /// Name of a way, and settings that make it.
-const WAYS: [(&str, Overrides); 14] = [
+const WAYS: [(&str, Overrides); 15] = [
     ("cube of 8", &[("gather", "cube"), ("hemisphere_size", "8")]),
     ("cube of 16", &[("gather", "cube"), ("hemisphere_size", "16")]),
     ("cube of 32", &[("gather", "cube"), ("hemisphere_size", "32")]),
     ("cube of 64", &[("gather", "cube"), ("hemisphere_size", "64")]),
+    (
+        "cube of 128",
+        &[("gather", "cube"), ("hemisphere_size", "128"), ("a_frame", "200")],
+    ),
     ("plane of 32, half side 1", &[("gather", "plane"), ("half_side", "1")]),
     ("plane of 32, half side 2", &[("gather", "plane"), ("half_side", "2")]),
     ("plane of 32, half side 3", &[("gather", "plane"), ("half_side", "3")]),
@@ -40,10 +44,10 @@ const WAYS: [(&str, Overrides); 14] = [
     ("256 rays through environment maps", &[("rays", "256"), ("guided", "0")]),
 ];
 
-fn settings(places: u32, photons: u32, overrides: Overrides) -> Result<Settings, String> {
+fn settings([places, photons, bounces]: [u32; 3], overrides: Overrides) -> Result<Settings, String> {
     let mut settings = Settings {
         indirect_method: IndirectMethod::IlluminationMaps,
-        bounces: BOUNCES,
+        bounces,
         photons,
         ..Settings::balanced()
     };
@@ -66,71 +70,80 @@ fn offline<'a>(gpu: &'a Gpu, scene: &Scene, settings: &Settings) -> Result<Offli
 /// A point that light is gathered at.
 struct Point {
     texel: usize,
-    place: SurfacePlace,
-    reflectance: [f32; 3],
+    position: DVec3,
+    normal: DVec3,
 }
 
-/// Texels that see their surroundings and lie on flat diffuse surfaces of one colour, in an order of their own.
-fn points(scene: &Scene, offline: &Offline<'_>, light: &[[f32; 4]], count: usize) -> Vec<Point> {
-    let total = 2 * offline.points.len();
-    let mut found = Vec::new();
-    for i in 0..total {
-        // Coprime to whatever number of texels is a power of two or of ten, twice a prime.
-        let texel = i * 7919 % total;
-        let point = &offline.points[texel / 2];
-        let instance = &scene.instances[point.instance];
-        let material = &scene.materials[instance.material];
-        let is_plain =
-            material.base_color_texture.is_none() && material.metallic == 0.0 && material.transmission == 0.0;
-        if !is_plain || light[texel][3] < 0.999 || material.base_color.contains(&0.0) {
-            continue;
-        }
-        let side = if texel % 2 == 0 { 1.0 } else { -1.0 };
-        let place = point.in_world(&instance.transform);
-        found.push(Point {
-            texel,
-            place: SurfacePlace {
-                normal: side * place.normal,
-                ..place
-            },
-            reflectance: material.base_color,
-        });
-        if found.len() == count {
-            break;
-        }
-    }
-    found
-}
-
-/// Irradiance that paths bring to a point, the sum of its channels, and its standard error.
-fn truth(reference: &mut Reference<'_>, point: &Point, scale: f64, paths: u32) -> Result<[f64; 2], String> {
-    let back = point.place.normal;
-    let helper = if back.y.abs() < 0.9 { DVec3::Y } else { DVec3::X };
-    let right = helper.cross(back).normalize();
-    let from = point.place.position + 1e-4 * scale * back;
-    reference.look(Camera {
-        name: String::new(),
-        transform: DAffine3::from_cols(right, back.cross(right), back, from),
-        projection: Projection::Orthographic {
-            half_height: 1e-5 * scale,
-        },
+/// Texels that see their surroundings, and light, in an order of their own.
+fn points(gpu: &Gpu, offline: &Offline<'_>, light: &[[f32; 4]], count: usize) -> Result<Vec<Point>, String> {
+    let mut texels: Vec<usize> = (0..2 * offline.points.len()).collect();
+    texels.sort_by_cached_key(|&texel| {
+        let mut hasher = DefaultHasher::new();
+        texel.hash(&mut hasher);
+        hasher.finish()
     });
-    for _ in 0..paths.div_ceil(POINT_SIZE * POINT_SIZE) {
-        reference.render_sample(None).map_err(|e| e.to_string())?;
-    }
-    let estimate = reference.read().map_err(|e| e.to_string())?;
-    let pixels = estimate.mean.len() as f64;
-    let irradiance = |rgb: &[f32; 3]| {
-        let of_channel = |c: usize| std::f64::consts::PI * f64::from(rgb[c]) / f64::from(point.reflectance[c]);
-        (0..3).map(of_channel).sum::<f64>()
+    let sees = |&texel: &usize| light[texel][3] > 0.999 && light[texel][..3].iter().any(|&v| v > 0.0);
+    let lights = offline.renderer.surface_lights().ok_or("no texels")?;
+    let frame = offline.renderer.frame().ok_or("no frame")?;
+    let records: Vec<[f32; 8]> =
+        read_buffer_blocking(&gpu.device, &gpu.queue, lights.shining()).map_err(|e| e.to_string())?;
+    let point = |texel: usize| {
+        let [x, y, z, _, nx, ny, nz, _] = records[texel];
+        Point {
+            texel,
+            position: frame.world_point(Vec3::new(x, y, z)),
+            normal: DVec3::new(f64::from(nx), f64::from(ny), f64::from(nz)),
+        }
     };
-    let mean = estimate.mean.iter().map(irradiance).sum::<f64>() / pixels;
-    let squares = estimate
-        .mean
-        .iter()
-        .map(|p| (irradiance(p) - mean).powi(2))
-        .sum::<f64>();
-    Ok([mean, (squares / (pixels - 1.0) / pixels).sqrt()])
+    Ok(texels.into_iter().filter(sees).take(count).map(point).collect())
+}
+
+/// Irradiance that paths bring to a point, the sum of its channels, and its standard error: the point looks around, above and,
+/// by the upper halves of four pictures, to its sides, so that the directions of paths are spread evenly.
+fn truth(reference: &mut Reference<'_>, point: &Point, scale: f64, paths: u32) -> Result<[f64; 2], String> {
+    let up = point.normal;
+    let helper = if up.y.abs() < 0.9 { DVec3::Y } else { DVec3::X };
+    let right = helper.cross(up).normalize();
+    let ahead = up.cross(right);
+    let mut sum = [0.0; 2];
+    let faces = [(up, ahead), (right, up), (-right, up), (ahead, up), (-ahead, up)];
+    let samples = (paths / (faces.len() as u32 * POINT_SIZE * POINT_SIZE)).max(1);
+    for (face, (forward, face_up)) in faces.into_iter().enumerate() {
+        reference.look(Camera {
+            name: String::new(),
+            transform: DAffine3::from_cols(
+                forward.cross(face_up),
+                face_up,
+                -forward,
+                point.position + 1e-4 * scale * up,
+            ),
+            projection: Projection::Perspective { fov_y: FRAC_PI_2 },
+        });
+        for _ in 0..samples {
+            reference.render_sample(None).map_err(|e| e.to_string())?;
+        }
+        let estimate = reference.read().map_err(|e| e.to_string())?;
+        for (pixel, (mean, error)) in (0..).zip(estimate.mean.iter().zip(&estimate.standard_error)) {
+            let weight = PI * form_factor(face, [pixel % POINT_SIZE, pixel / POINT_SIZE]);
+            let of_rgb = |rgb: &[f32; 3]| rgb.iter().map(|&v| f64::from(v)).sum::<f64>();
+            sum[0] += weight * of_rgb(mean);
+            sum[1] += (weight * of_rgb(error)).powi(2);
+        }
+    }
+    Ok([sum[0], sum[1].sqrt()])
+}
+
+/// Share of the hemisphere, weighted by the cosine, that a pixel of a face covers, from 16 points of it.
+fn form_factor(face: usize, pixel: [u32; 2]) -> f64 {
+    const PARTS: u32 = 4;
+    let parts = (0..PARTS).flat_map(|y| (0..PARTS).map(move |x| [x, y]));
+    let width = 2.0 / f64::from(PARTS * POINT_SIZE);
+    let of_part = |part: [u32; 2]| {
+        let [x, y] = [0, 1].map(|i| (f64::from(PARTS * pixel[i] + part[i]) + 0.5) * width - 1.0);
+        let cosine = if face == 0 { 1.0 } else { (-y).max(0.0) };
+        cosine * width * width / (PI * (1.0 + x * x + y * y).powi(2))
+    };
+    parts.map(of_part).sum()
 }
 
 /// Of all texels, as gathered.
@@ -141,24 +154,32 @@ fn gathered(gpu: &Gpu, offline: &Offline<'_>) -> Result<Vec<[f32; 4]>, String> {
 
 /// The table of errors.
 pub(crate) fn errors(gpu: &Gpu, arguments: &Arguments) -> Result<(), String> {
-    println!("{} places, {} photons\n", arguments.places, arguments.photons);
-    let mut rows: Vec<String> = WAYS.iter().map(|(name, _)| format!("| {name} |")).collect();
+    println!(
+        "{} places, {} photons, {} bounces\n",
+        arguments.places, arguments.photons, arguments.bounces
+    );
+    let ways: Vec<_> = WAYS.iter().filter(|w| w.0.contains(&arguments.ways)).collect();
+    let mut rows: Vec<String> = ways.iter().map(|(name, _)| format!("| {name} |")).collect();
     let mut head = String::from("| error: median, 95th percentile, share within 1 % |");
     for name in &arguments.samples {
         let scene = samples::by_name(name, 0.3).ok_or_else(|| format!("there is no sample {name}"))?;
         let mut truths = Vec::new();
         let mut chosen = Vec::new();
-        for ((way, overrides), row) in WAYS.iter().zip(&mut rows) {
-            let mut settings = settings(arguments.places, arguments.photons, overrides)?;
+        for ((way, overrides), row) in ways.iter().zip(&mut rows) {
+            let mut settings = settings([arguments.places, arguments.photons, arguments.bounces], overrides)?;
             if way.contains("environment") {
                 settings.set("tracer.kind", "image-space").map_err(|e| e.to_string())?;
             }
+            let t = Instant::now();
             let mut offline = offline(gpu, &scene, &settings)?;
+            eprintln!("new {:?}", t.elapsed());
             offline.render_frame(None).map_err(|e| e.to_string())?;
+            eprintln!("frame {:?}", t.elapsed());
             let light = gathered(gpu, &offline)?;
             if chosen.is_empty() {
-                chosen = points(&scene, &offline, &light, arguments.points);
+                chosen = points(gpu, &offline, &light, arguments.points)?;
                 truths = all_truths(gpu, arguments, &scene, &chosen)?;
+                eprintln!("truth {:?}", t.elapsed());
                 let noise: Vec<f64> = truths.iter().map(|t| t[1] / t[0]).collect();
                 head += &format!(" {name} (noise {:.2} %) |", 100.0 * median(&noise));
             }
@@ -173,6 +194,18 @@ pub(crate) fn errors(gpu: &Gpu, arguments: &Arguments) -> Result<(), String> {
                     (own / truth[0] - 1.0).abs()
                 })
                 .collect();
+            for ((e, p), t) in errors.iter().zip(&chosen).zip(&truths) {
+                if *e > 0.01 {
+                    eprintln!(
+                        "{way} {:.4} at {:.2?} {:.2?} noise {:.4} truth {:.3}",
+                        e,
+                        p.position.to_array(),
+                        p.normal.to_array(),
+                        t[1] / t[0],
+                        t[0]
+                    );
+                }
+            }
             *row += &format!(" {} |", summary(errors));
         }
     }
@@ -183,8 +216,9 @@ pub(crate) fn errors(gpu: &Gpu, arguments: &Arguments) -> Result<(), String> {
 
 fn all_truths(gpu: &Gpu, arguments: &Arguments, scene: &Scene, points: &[Point]) -> Result<Vec<[f64; 2]>, String> {
     let paths = PathTracerSettings {
-        component: PathComponent::Indirect,
-        bounces: BOUNCES,
+        component: PathComponent::All,
+        // The surface that is seen scatters, too.
+        bounces: arguments.bounces.saturating_sub(1),
         ..PathTracerSettings::default()
     };
     let mut reference = Reference::new(gpu, scene.clone(), &paths, 0, [POINT_SIZE; 2]).map_err(|e| e.to_string())?;
@@ -203,7 +237,7 @@ fn summary(mut errors: Vec<f64>) -> String {
 }
 
 /// The table of times: what a texel costs by the scene's triangles.
-pub(crate) fn times(gpu: &Gpu) -> Result<(), String> {
+pub(crate) fn times(gpu: &Gpu, arguments: &Arguments) -> Result<(), String> {
     const CELLS: [[u32; 2]; 3] = [[3, 1], [80, 81], [258, 258]];
     let scenes: Vec<Scene> = CELLS.iter().map(|&cells| samples::bumpy_floor(cells, 0.3)).collect();
     let head: Vec<String> = scenes
@@ -211,7 +245,7 @@ pub(crate) fn times(gpu: &Gpu) -> Result<(), String> {
         .map(|s| format!("{} triangles", s.triangle_count()))
         .collect();
     println!("| µs a texel | {} |\n|---|---|---|---|", head.join(" | "));
-    for (way, overrides) in &WAYS[..WAYS.len() - 1] {
+    for (way, overrides) in WAYS[..WAYS.len() - 1].iter().filter(|w| w.0.contains(&arguments.ways)) {
         let mut row = format!("| {way} |");
         for scene in &scenes {
             row += &format!(" {:.0} |", 1e6 * seconds_of_texel(gpu, scene, overrides)?);
@@ -225,7 +259,7 @@ pub(crate) fn times(gpu: &Gpu) -> Result<(), String> {
 const TIMED_PLACES: u32 = 500;
 
 fn seconds_of_texel(gpu: &Gpu, scene: &Scene, overrides: Overrides) -> Result<f64, String> {
-    let settings = settings(TIMED_PLACES, 1000, overrides)?;
+    let settings = settings([TIMED_PLACES, 1000, 1], overrides)?;
     let mut offline = offline(gpu, scene, &settings)?;
     let mut time = |is_filled: bool| {
         let mut all = Vec::new();

@@ -44,6 +44,12 @@ struct Arguments {
     /// Places of `gather`
     #[arg(long, default_value_t = 8000)]
     places: u32,
+    /// Times that light is scattered before it is gathered: the truth of more is noisier
+    #[arg(long, default_value_t = 1)]
+    bounces: u32,
+    /// Ways of `gather` and `triangles`: those whose names contain this
+    #[arg(long, default_value = "")]
+    ways: String,
     /// Photons of `gather`
     #[arg(long, default_value_t = 2_000_000)]
     photons: u32,
@@ -72,7 +78,7 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         match part.as_str() {
             "cost" => cost::table(&gpu, arguments)?,
             "gather" => gather::errors(&gpu, arguments)?,
-            "triangles" => gather::times(&gpu)?,
+            "triangles" => gather::times(&gpu, arguments)?,
             "texels" => texels::table(&gpu, arguments)?,
             other => return Err(format!("{other} is no part: cost, gather, triangles, texels")),
         }

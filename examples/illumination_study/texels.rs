@@ -1,6 +1,171 @@
-//! placeholder
+//! How fine texels are to lie: error, kinks and time by the number along a wall, where a host lays them out itself.
+//!
+//! The sample `cornell`, whose faces are quadrilaterals: rows and columns of texels on each, as a host's light map would have
+//! them, as dense on blocks as on the floor. The truth is path traced; what its noise adds to errors is taken off.
+
 use crate::Arguments;
 use crate::common::adapter::Gpu;
-pub(crate) fn table(_: &Gpu, _: &Arguments) -> Result<(), String> {
+use crate::common::clock::median;
+use crate::common::offline::{self, Component, Offline};
+use crate::common::reference::Reference;
+use lightfall::frame::{IndirectMethod, Settings};
+use lightfall::glam::Vec3;
+use lightfall::reference::{PathComponent, PathEstimate, PathTracerSettings};
+use lightfall::scene::{Scene, SurfacePoint, samples};
+use std::time::Instant;
+
+/// Texels along the floor.
+const ALONG: [u32; 6] = [5, 10, 15, 20, 30, 50];
+
+const BOUNCES: u32 = 2;
+
+/// Pixels along an axis, and paths of each that the truth is the mean of.
+const SIZE: u32 = 64;
+const SAMPLES: u32 = 1024;
+
+/// Prints the table.
+pub(crate) fn table(gpu: &Gpu, _: &Arguments) -> Result<(), String> {
+    let scene = samples::cornell(0.3);
+    let truth = truth(gpu, &scene)?;
+    println!("{SIZE} × {SIZE} pixels, {BOUNCES} bounces\n");
+    println!("| along the floor | places | photons | relMSE | bias | kinks | ms to gather all | ms a frame |");
+    println!("|---|---|---|---|---|---|---|---|");
+    for photons in [20_000, 200_000] {
+        for along in ALONG {
+            for least in [0, 200] {
+                let row = measure(gpu, &scene, &truth, [along, photons, least])?;
+                println!("{row}");
+            }
+        }
+    }
     Ok(())
+}
+
+fn truth(gpu: &Gpu, scene: &Scene) -> Result<PathEstimate, String> {
+    let paths = PathTracerSettings {
+        component: PathComponent::Indirect,
+        bounces: BOUNCES,
+        ..PathTracerSettings::default()
+    };
+    let mut reference = Reference::new(gpu, scene.clone(), &paths, 0, [SIZE; 2]).map_err(|e| e.to_string())?;
+    for _ in 0..SAMPLES {
+        reference.render_sample(None).map_err(|e| e.to_string())?;
+    }
+    reference.read().map_err(|e| e.to_string())
+}
+
+/// A texel in the middle of each cell of the faces of a scene, all of which are quadrilaterals.
+fn light_map(scene: &Scene, along: u32) -> Vec<SurfacePoint> {
+    let mut points = Vec::new();
+    let mut surface = 0;
+    let floor = Vec3::from(scene.meshes[0].positions[2]).x;
+    for (index, instance) in scene.instances.iter().enumerate() {
+        let mesh = &scene.meshes[instance.mesh];
+        for corners in mesh.positions.chunks_exact(4) {
+            let [a, b, _, d] = [0, 1, 2, 3].map(|i| Vec3::from(corners[i]));
+            let (right, up) = (d - a, b - a);
+            let cells = |side: Vec3| ((along as f32 * side.length() / floor).round() as u32).max(1);
+            let (columns, rows) = (cells(right), cells(up));
+            let normal = up.cross(Vec3::from(corners[2]) - a).normalize();
+            for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+                let part = |i: u32, count: u32| (i as f32 + 0.5) / count as f32;
+                points.push(SurfacePoint {
+                    instance: index,
+                    position: a + part(column, columns) * right + part(row, rows) * up,
+                    normal,
+                    area: f64::from(right.cross(up).length()) / f64::from(columns * rows),
+                    surface,
+                });
+            }
+            surface += 1;
+        }
+    }
+    points
+}
+
+fn measure(
+    gpu: &Gpu,
+    scene: &Scene,
+    truth: &PathEstimate,
+    [along, photons, least]: [u32; 3],
+) -> Result<String, String> {
+    let mut settings = Settings {
+        indirect_method: IndirectMethod::IlluminationMaps,
+        bounces: BOUNCES,
+        photons,
+        ..Settings::balanced()
+    };
+    let points = light_map(scene, along);
+    settings.illumination_maps.texels = points.len() as u32;
+    settings.illumination_maps.gather.a_frame = 4000;
+    settings.illumination_maps.gather.least_photons = least;
+    for (key, value) in [
+        ("tracer.kind", "bvh"),
+        ("emission.first_hits", "traced"),
+        ("splatter.subsampling", "1"),
+    ] {
+        settings.set(key, value).map_err(|e| e.to_string())?;
+    }
+    let size = [SIZE; 2];
+    let offline = Offline::new(gpu, scene.clone(), &settings, 0, size, Component::Indirect);
+    let mut offline = offline.map_err(|e| e.to_string())?;
+    offline.points = points;
+    let time = |offline: &mut Offline<'_>, is_filled: bool| {
+        let mut all = Vec::new();
+        for _ in 0..3 {
+            if is_filled {
+                offline.refill();
+            }
+            let start = Instant::now();
+            offline.render_frame(None).map_err(|e| e.to_string())?;
+            offline::wait(&gpu.device).map_err(|e| e.to_string())?;
+            all.push(1e3 * start.elapsed().as_secs_f64());
+        }
+        Ok::<_, String>(median(&all))
+    };
+    let with = time(&mut offline, true)?;
+    let without = time(&mut offline, false)?;
+    let own = offline.read().map_err(|e| e.to_string())?;
+    let [relative, bias] = error(&own, truth);
+    Ok(format!(
+        "| {along} | {} | {photons}{} | {relative:.4} | {:+.1} % | {:.3} | {:.0} | {without:.0} |",
+        offline.points.len(),
+        if least > 0 {
+            format!(", {least} at least")
+        } else {
+            String::new()
+        },
+        100.0 * bias,
+        kinks(&own),
+        with - without,
+    ))
+}
+
+/// Relative mean square error, less what the truth's noise adds, and bias.
+fn error(own: &[[f32; 3]], truth: &PathEstimate) -> [f64; 2] {
+    let mean =
+        |image: &[[f32; 3]]| image.iter().flatten().map(|&v| f64::from(v)).sum::<f64>() / (3 * image.len()) as f64;
+    let level = mean(&truth.mean);
+    let mut sum = 0.0;
+    for ((own, truth), error) in own.iter().zip(&truth.mean).zip(&truth.standard_error) {
+        for c in 0..3 {
+            let (o, t, e) = (f64::from(own[c]), f64::from(truth[c]), f64::from(error[c]));
+            sum += ((o - t).powi(2) - e * e) / (t * t + (0.01 * level).powi(2));
+        }
+    }
+    [sum / (3 * own.len()) as f64, mean(own) / level - 1.0]
+}
+
+/// Median of how far a pixel is from the middle of those to its left and right, over its light, where it is not an edge.
+fn kinks(image: &[[f32; 3]]) -> f64 {
+    let rows = image.chunks_exact(SIZE as usize);
+    let of_pixel = |w: &[[f32; 3]]| {
+        let at = |i: usize| w[i].iter().map(|&v| f64::from(v)).sum::<f64>();
+        (at(0) + at(2) - 2.0 * at(1)).abs() / at(1).max(1e-9)
+    };
+    let all: Vec<f64> = rows
+        .flat_map(|row| row.windows(3).map(of_pixel))
+        .filter(|k| *k < 0.3)
+        .collect();
+    median(&all)
 }

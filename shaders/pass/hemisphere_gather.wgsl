@@ -34,7 +34,7 @@ struct Hemisphere {
 @group(0) @binding(8) var<storage, read_write> gathered: array<vec4f>;
 @group(0) @binding(9) var<storage, read_write> due: array<u32>;
 
-const LANES: u32 = 64u;
+const LANES: u32 = 256u;
 
 // Light, and the share of backs
 var<workgroup> sums: array<vec4f, LANES>;
@@ -79,7 +79,7 @@ fn shown(hemisphere: Hemisphere, pixel: u32) -> vec4f {
     return vec4f(radiosity[light].rgb, nothing.a);
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(256)
 fn gather_hemispheres(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_index) lane: u32) {
     let hemisphere = hemispheres[group.x];
     var sum = vec4f(0.0);

@@ -670,18 +670,27 @@ impl GiRenderer {
     }
 
     /// Gathers all texels of the illumination map at once by the host's draws, where these gather, from the light of the last frame
-    /// that was recorded or filled ([`GiRenderer::fill_illumination_map`]): at the start, after a cut. Submits what it records
-    /// and does not wait. It prepares the geometry for views of its own: call `prepare` again before `record_scene`.
+    /// that was recorded or filled ([`GiRenderer::fill_illumination_map`]): at the start, after a cut. Submits and waits, for
+    /// texels stand where photons arrived. It prepares the geometry for views of its own: call `prepare` again before
+    /// `record_scene`.
     ///
     /// # Errors
-    /// [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
-    pub fn gather_illumination_map(&mut self, queue: &wgpu::Queue, geometry: &mut dyn Geometry) -> Result<(), Error> {
+    /// [`Error::ReadBack`], [`Error::LimitExceeded`], or what the geometry's `prepare` returns.
+    pub fn gather_illumination_map_blocking(
+        &mut self,
+        queue: &wgpu::Queue,
+        geometry: &mut dyn Geometry,
+    ) -> Result<(), Error> {
         let texels = self.texel_count();
         let (Some(state), Some(indirect)) = (&self.state, &mut self.indirect) else {
             return Ok(());
         };
         let Some(at_once) = indirect.hemispheres_mut().map(|h| h.capacity()) else {
             return Ok(());
+        };
+        let shifts = match indirect.illumination() {
+            Some(own) => own.lights().read_shifts_blocking(&self.device, queue)?,
+            None => Vec::new(),
         };
         let context = PrepareContext {
             device: &self.device,
@@ -692,8 +701,11 @@ impl GiRenderer {
             let Some(hemispheres) = indirect.hemispheres_mut() else {
                 break;
             };
-            let chosen = first..texels.min(first + at_once);
-            let mut views = hemispheres.plan_texels(queue, (&state.frame, &self.surface_places), chosen)?;
+            let next = texels.min(first + at_once);
+            let Some(shifts) = shifts.get(first as usize..next as usize) else {
+                break;
+            };
+            let mut views = hemispheres.plan_texels(queue, (&state.frame, &self.surface_places), (first, shifts))?;
             number(&mut views);
             geometry.prepare(&context, &views)?;
             let mut encoder = self.device.create_command_encoder(&Default::default());

@@ -3,7 +3,6 @@
 
 use super::Settings;
 use super::indirect_scene::PhotonPasses;
-use crate::Error;
 use crate::Timestamps;
 use crate::pass::{HemisphereGatherInputs, HemisphereGatherResources};
 use crate::read_back::ReadBackRing;
@@ -11,17 +10,29 @@ use crate::resource::{
     CaptureView, GatherShape, Geometry, HemispherePlace, Hemispheres, IlluminationMap, SurfaceLights,
 };
 use crate::scene::{SurfacePlace, UnitFrame};
+use crate::{Error, gpu};
+use glam::Vec3;
 
 /// Allocated while light is gathered so.
 #[derive(Debug)]
 pub(super) struct HemisphereScene {
     hemispheres: Hemispheres,
     gather: HemisphereGatherResources,
+    /// Texels that were chosen, and how far they stand from their places, as they come back.
+    returned: wgpu::Buffer,
     ring: ReadBackRing,
     /// Whether a list of texels is on its way: until it has come, none else are chosen.
     is_under_way: bool,
     /// Texels to gather in the next frame that is recorded.
-    texels: Vec<u32>,
+    texels: Vec<ChosenTexel>,
+}
+
+/// A texel that light is gathered at.
+#[derive(Debug, Clone, Copy)]
+struct ChosenTexel {
+    index: u32,
+    /// From its place, unit frame.
+    shift: Vec3,
 }
 
 /// What draws take.
@@ -42,11 +53,13 @@ impl HemisphereScene {
         (shape, map): (GatherShape, &IlluminationMap),
     ) -> Result<Self, Error> {
         let own = &settings.illumination_maps;
-        let bytes = map.chosen().buffer().size();
+        let bytes = map.chosen().buffer().size() + map.shifts().size();
+        let usage = wgpu::BufferUsages::COPY_SRC | wgpu::BufferUsages::COPY_DST;
         Ok(Self {
             hemispheres: Hemispheres::new(device, queue, (shape, own.hemisphere_size), own.gather.a_frame)?,
             gather: HemisphereGatherResources::new(device)?,
-            ring: ReadBackRing::new(device, "lightfall::HemisphereScene::chosen", bytes)?,
+            returned: gpu::buffer(device, "lightfall::HemisphereScene::returned", bytes, usage)?,
+            ring: ReadBackRing::new(device, "lightfall::HemisphereScene::ring", bytes)?,
             is_under_way: false,
             texels: Vec::new(),
         })
@@ -69,23 +82,22 @@ impl HemisphereScene {
             self.is_under_way = false;
         }
         if let Some(words) = arrived {
-            // Workgroups of a dispatch, how many there are, and they.
-            let count = words.get(3).map_or(0, |&n| n as usize);
-            self.texels = words.into_iter().skip(4).take(count).collect();
+            self.texels = chosen(&words, self.hemispheres.capacity());
         }
-        self.texels.retain(|&t| t as usize / 2 < places.len());
+        self.texels.retain(|t| t.index as usize / 2 < places.len());
         self.texels.truncate(self.hemispheres.capacity() as usize);
         self.stand(queue, frame, places)
     }
 
-    /// The views of given texels, at most [`HemisphereScene::capacity`].
+    /// The views of texels from one on, at most [`HemisphereScene::capacity`], which stand so far from their places, unit frame.
     pub(super) fn plan_texels(
         &mut self,
         queue: &wgpu::Queue,
         (frame, places): (&UnitFrame, &[SurfacePlace]),
-        texels: std::ops::Range<u32>,
+        (first, shifts): (u32, &[Vec3]),
     ) -> Result<Vec<CaptureView>, Error> {
-        self.texels = texels.collect();
+        let texels = (first..).zip(shifts);
+        self.texels = texels.map(|(index, &shift)| ChosenTexel { index, shift }).collect();
         self.stand(queue, frame, places)
     }
 
@@ -96,13 +108,13 @@ impl HemisphereScene {
         places: &[SurfacePlace],
     ) -> Result<Vec<CaptureView>, Error> {
         // Two texels a place, the first on the side that its normal points to.
-        let of_texel = |&texel: &u32| {
-            let place = &places[texel as usize / 2];
-            let side = if texel % 2 == 0 { 1.0 } else { -1.0 };
+        let of_texel = |texel: &ChosenTexel| {
+            let place = &places[texel.index as usize / 2];
+            let side = if texel.index % 2 == 0 { 1.0 } else { -1.0 };
             HemispherePlace {
-                position: frame.point(place.position),
+                position: frame.point(place.position) + texel.shift,
                 normal: (side * place.normal).as_vec3(),
-                texel,
+                texel: texel.index,
             }
         };
         let standing: Vec<_> = self.texels.iter().map(of_texel).collect();
@@ -119,7 +131,10 @@ impl HemisphereScene {
     ) -> Result<(), Error> {
         self.record_draws(encoder, inputs, (lights, map))?;
         if !self.is_under_way {
-            self.ring.record(encoder, map.chosen().buffer());
+            let list = map.chosen().buffer();
+            encoder.copy_buffer_to_buffer(list, 0, &self.returned, 0, list.size());
+            encoder.copy_buffer_to_buffer(map.shifts(), 0, &self.returned, list.size(), map.shifts().size());
+            self.ring.record(encoder, &self.returned);
             self.is_under_way = true;
         }
         Ok(())
@@ -161,6 +176,19 @@ impl HemisphereScene {
 
     pub(super) fn memory_use(&self) -> u64 {
         let ring = ReadBackRing::size_in_bytes(self.ring.size());
-        self.hemispheres.memory_use() + self.gather.memory_use() + ring
+        self.hemispheres.memory_use() + self.gather.memory_use() + self.returned.size() + ring
     }
+}
+
+/// What has come back: workgroups of a dispatch, how many texels there are, they, as many as there is room for, and their shifts.
+fn chosen(words: &[u32], room: u32) -> Vec<ChosenTexel> {
+    const HEADER: usize = 4;
+    let count = words.get(HEADER - 1).copied().unwrap_or(0).min(room) as usize;
+    let texels = words.iter().skip(HEADER);
+    let shifts = words.get(HEADER + room as usize..).unwrap_or_default().chunks_exact(4);
+    let texel = |(&index, shift): (&u32, &[u32])| ChosenTexel {
+        index,
+        shift: Vec3::from([shift[0], shift[1], shift[2]].map(f32::from_bits)),
+    };
+    texels.zip(shifts).take(count).map(texel).collect()
 }

@@ -171,7 +171,7 @@ pub struct IlluminationMapSettings {
     /// By what: draws begin some frames after a change, for which texels these are for comes back from the GPU, and want fewer
     /// texels a frame.
     pub method: TexelGatherMethod,
-    /// Pixels that draws are wide, even, 2 to 256.
+    /// Pixels that draws are wide, even, 2 to 128.
     pub hemisphere_size: u32,
     /// Half the side of a plane, in distances from the texel, above 0 and up to 16. Wider covers more, and more coarsely.
     pub half_side: f32,
@@ -1029,9 +1029,9 @@ const KNOBS: &[Knob] = &[
     ),
     field!(
         "illumination_maps.hemisphere_size",
-        "even, 2 to 256: pixels",
+        "even, 2 to 128: pixels",
         illumination_maps.hemisphere_size,
-        |v| (2..=256).contains(&v) && v % 2 == 0
+        |v| (2..=128).contains(&v) && v % 2 == 0
     ),
     field!(
         "illumination_maps.half_side",

@@ -68,11 +68,14 @@ pub(crate) const DUE_SLOTS: [Slot; 7] = [
 ];
 
 /// Bindings of `shaders/pass/texel_gather/choose_texels.wgsl`, in order.
-pub(crate) const CHOICE_SLOTS: [Slot; 5] = [
+pub(crate) const CHOICE_SLOTS: [Slot; 8] = [
     Slot::Uniform,
     Slot::StorageMut,
     Slot::StorageMut,
     Slot::StorageMut,
+    Slot::StorageMut,
+    Slot::Storage,
+    Slot::Storage,
     Slot::StorageMut,
 ];
 
@@ -368,6 +371,9 @@ impl TexelGather {
             map.chosen().buffer().into(),
             map.counts().into(),
             map.places().into(),
+            lights.records().into(),
+            lights.shining().into(),
+            map.shifts().into(),
         ];
         let incident = guides.map(|(pool, photons)| {
             [

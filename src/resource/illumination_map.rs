@@ -16,6 +16,7 @@ pub struct IlluminationMap {
     counts: wgpu::Buffer,
     radiosity: wgpu::Buffer,
     places: wgpu::Buffer,
+    shifts: wgpu::Buffer,
     chosen: PathList,
     capacity: u32,
     is_stale: bool,
@@ -42,6 +43,12 @@ impl IlluminationMap {
             counts: device::buffer(device, "lightfall::IlluminationMap::counts", 8, usage)?,
             radiosity: buffer("lightfall::IlluminationMap::radiosity", 16)?,
             places: buffer("lightfall::IlluminationMap::places", 4)?,
+            shifts: device::buffer(
+                device,
+                "lightfall::IlluminationMap::shifts",
+                16 * u64::from(a_frame.max(1)),
+                usage,
+            )?,
             chosen: PathList::with_room(device, a_frame)?,
             capacity,
             is_stale: true,
@@ -83,6 +90,11 @@ impl IlluminationMap {
     /// that it is taken from. Four `f32`. Of the present frame.
     pub fn radiosity(&self) -> &wgpu::Buffer {
         &self.radiosity
+    }
+
+    /// Of each of the texels that are gathered in a frame how far it stands from its place: four `f32`, unit frame, the last 0.
+    pub fn shifts(&self) -> &wgpu::Buffer {
+        &self.shifts
     }
 
     /// Of each texel one more than its place among those chosen, or 0; while rays are guided.
@@ -129,6 +141,7 @@ impl IlluminationMap {
             &self.counts,
             &self.radiosity,
             &self.places,
+            &self.shifts,
         ];
         own.iter().map(|b| b.size()).sum::<u64>() + self.chosen.memory_use()
     }

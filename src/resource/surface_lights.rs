@@ -1,7 +1,7 @@
 //! Virtual surface lights: points that stand for the light that the surface around them sends on.
 
 use crate::scene::{SurfacePlace, UnitFrame};
-use crate::{Error, gpu as device};
+use crate::{Error, gpu as device, read_buffer_blocking};
 use glam::{UVec3, Vec3};
 
 /// Most cells along an axis: they are as wide as lights lie apart, or as this many cover all lights.
@@ -184,6 +184,14 @@ impl SurfaceLights {
     /// until there is one.
     pub fn shining(&self) -> &wgpu::Buffer {
         &self.shining
+    }
+
+    /// How far from its place each of the lights shines, unit frame: waits for the GPU.
+    pub(crate) fn read_shifts_blocking(&self, device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Vec<Vec3>, Error> {
+        let shining: Vec<gpu::SurfaceLight> = read_buffer_blocking(device, queue, &self.shining)?;
+        let shift =
+            |(from, to): (&gpu::SurfaceLight, &gpu::SurfaceLight)| Vec3::from(to.position) - Vec3::from(from.position);
+        Ok(self.written.iter().zip(&shining).map(shift).collect())
     }
 
     pub(crate) fn nearest(&self) -> &wgpu::Buffer {

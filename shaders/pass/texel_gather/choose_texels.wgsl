@@ -7,6 +7,10 @@
 @group(0) @binding(3) var<storage, read_write> counts: array<u32, 2>;
 // Of each texel one more than its place in the list, or 0
 @group(0) @binding(4) var<storage, read_write> places: array<u32>;
+@group(0) @binding(5) var<storage, read> lights: array<SurfaceLight>;
+@group(0) @binding(6) var<storage, read> shining: array<SurfaceLight>;
+// Of each in the list how far it stands from its place, where photons arrive that it does not hide from
+@group(0) @binding(7) var<storage, read_write> shifts: array<vec4f>;
 
 fn candidate_count() -> u32 {
     return params.texel_count;
@@ -34,6 +38,7 @@ fn take_candidate(texel: u32, at: u32) {
     }
     chosen.paths[at] = texel;
     places[texel] = at + 1u;
+    shifts[at] = vec4f(shining[texel].position - lights[texel].position, 0.0);
 }
 
 @compute @workgroup_size(256)
