@@ -117,6 +117,8 @@
 
 #[cfg(all(test, feature = "bvh"))]
 mod bvh_tests;
+#[cfg(feature = "bvh")]
+mod bvh_tree;
 mod error;
 pub mod frame;
 mod gpu;

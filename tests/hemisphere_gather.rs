@@ -49,7 +49,7 @@ fn gather(gpu: &Gpu, quads: &[[[f32; 3]; 4]], (shape, size): (GatherShape, u32),
             SurfacePlace {
                 position: 0.5 * (a + c),
                 normal: (b - a).cross(c - a).normalize(),
-                area: (b - a).cross(c - b).length(),
+                areas: [(b - a).cross(c - b).length(); 2],
                 surface: 0,
             }
         })

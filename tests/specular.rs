@@ -22,11 +22,10 @@ fn settings() -> Settings {
         bounces: 4,
         shadow_map_size: 256,
         caustic: CausticSettings {
-            method: Default::default(),
-            filter: Default::default(),
             photons: 25_000,
             kernel_photons: 5.0,
             min_radius: 0.0,
+            ..CausticSettings::default()
         },
         specular_paths: 1,
         specular_surfaces: 5,

@@ -46,7 +46,7 @@ impl Random {
         let place = |r: &mut Self| SurfacePlace {
             position: r.within(),
             normal: r.direction(),
-            area: 0.02,
+            areas: [0.02; 2],
             surface: 0,
         };
         (0..count).map(|_| place(self)).collect()
@@ -749,7 +749,7 @@ fn a_light_gives_what_its_formula_says_near_and_far() {
         let place = SurfacePlace {
             position,
             normal,
-            area,
+            areas: [area; 2],
             surface: 0,
         };
         for shape in [LightShape::Point, LightShape::Disc, LightShape::Square] {
@@ -789,7 +789,7 @@ fn factor(place: &SurfacePlace, p: DVec3, area: f64) -> f64 {
 /// From the square around it: its sides as the shader turns them do not matter by much.
 fn by_square(place: &SurfacePlace, p: DVec3) -> f64 {
     let (t, b) = frame_around(place.normal);
-    let side = place.area.sqrt();
+    let side = place.areas[0].sqrt();
     let pieces = 64;
     let at = |k: i32| (f64::from(k) + 0.5) / f64::from(pieces) - 0.5;
     let mut sum = 0.0;
@@ -799,7 +799,7 @@ fn by_square(place: &SurfacePlace, p: DVec3) -> f64 {
             ..*place
         };
         // Each piece is small, and a disc of its own.
-        sum += factor(&piece, p, place.area / f64::from(pieces * pieces));
+        sum += factor(&piece, p, place.areas[0] / f64::from(pieces * pieces));
     }
     sum / f64::from(pieces * pieces)
 }
@@ -824,7 +824,7 @@ fn what_is_missing_or_bad_is_named() {
     let place = SurfacePlace {
         position: DVec3::ZERO,
         normal: DVec3::Y,
-        area: 1.0,
+        areas: [1.0; 2],
         surface: 0,
     };
     let many = lights.write(queue, &frame, &[place; 3]);
@@ -848,7 +848,10 @@ fn what_is_missing_or_bad_is_named() {
             normal: DVec3::ZERO,
             ..place
         },
-        SurfacePlace { area: -1.0, ..place },
+        SurfacePlace {
+            areas: [1.0, -1.0],
+            ..place
+        },
     ] {
         let found = lights.write(queue, &frame, &[place, bad]);
         assert!(matches!(found, Err(Error::InvalidScene { .. })), "{found:?}");

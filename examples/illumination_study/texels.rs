@@ -73,7 +73,7 @@ fn light_map(scene: &Scene, along: u32) -> Vec<SurfacePoint> {
                     instance: index,
                     position: a + part(column, columns) * right + part(row, rows) * up,
                     normal,
-                    area: f64::from(right.cross(up).length()) / f64::from(columns * rows),
+                    areas: [f64::from(right.cross(up).length()) / f64::from(columns * rows); 2],
                     surface,
                 });
             }

@@ -1,5 +1,5 @@
-// The light that an impact belongs to: the nearest one that faces the same way, by a distance that counts off the impact's
-// plane more than along it. The module brings `lights`, `grid` and `cells`: of each cell the first of its entries, and one
+// The light that an impact belongs to: the nearest one with an area that faces the same way, by a distance that counts off the
+// impact's plane more than along it. The module brings `lights`, `grid` and `cells`: of each cell the first of its entries, and one
 // more; behind them the entries, indices of lights.
 
 const NO_LIGHT: u32 = 0xffffffffu;
@@ -23,7 +23,8 @@ fn nearest_in_cell(found: Nearest, cell: vec3u, p: vec3f, n: vec3f) -> Nearest {
         let away = lights[light].position - p;
         let off_plane = dot(away, n);
         let distance_squared = dot(away, away) + OFF_PLANE * off_plane * off_plane;
-        if distance_squared < nearest.distance_squared && dot(lights[light].normal, n) >= SAME_WAY {
+        let is_kept = lights[light].area > 0.0 && dot(lights[light].normal, n) >= SAME_WAY;
+        if is_kept && distance_squared < nearest.distance_squared {
             nearest = Nearest(light, distance_squared);
         }
     }
@@ -67,7 +68,7 @@ fn nearest_light(p: vec3f, n: vec3f) -> u32 {
         let apart = 1.0 - dot(lights[light].normal, n);
         // Lengths in the unit frame are of the order of 1.
         let cost = dot(away, away) + 64.0 * apart;
-        if cost < nearest.distance_squared {
+        if lights[light].area > 0.0 && cost < nearest.distance_squared {
             nearest = Nearest(light, cost);
         }
     }

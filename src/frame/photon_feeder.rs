@@ -5,8 +5,8 @@
 //! no thread waits in a channel for it. Limits: bulbs, spots and suns have no extent; metal reflects like a mirror and glass
 //! ends a path; textures are looked up without filtering, cut-outs are whole.
 
+use crate::bvh_tree::binary_tree;
 use crate::halton::radical_inverse;
-use crate::resource::bvh_tree::binary_tree;
 use crate::resource::{Photon, PhotonMap, Photons};
 use crate::scene::{EmissiveTriangle, Light, LightKind, Scene, Sun, UnitFrame, one_minus_cos};
 use glam::{DVec3, Mat3, Vec2, Vec3, Vec3A};

@@ -2,8 +2,8 @@
 //! instances.
 
 use super::bvh_mesh::{self, BvhMesh, TOP_LEVELS};
-use super::bvh_tree::{Tree, fit};
 use super::texture_arrays::TextureArrays;
+use crate::bvh_tree::{Tree, fit};
 use crate::gpu::{self as device, Bound, Slot};
 use crate::scene::{Instance, Material, Scene, UnitFrame};
 use crate::{Error, resource};

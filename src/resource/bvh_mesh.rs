@@ -1,8 +1,8 @@
 //! One mesh as rays meet it: triangles in the order of the leaves of a compressed wide tree.
 
 use super::bvh_geometry::MeshTree;
-use super::bvh_tree::{Tree, fit};
 use crate::Error;
+use crate::bvh_tree::{Tree, fit};
 use crate::scene::Mesh;
 use glam::{DVec3, Vec3};
 use obvhs::aabb::Aabb;

@@ -7,8 +7,6 @@
 pub(crate) mod bvh_geometry;
 #[cfg(feature = "bvh")]
 pub(crate) mod bvh_mesh;
-#[cfg(feature = "bvh")]
-pub(crate) mod bvh_tree;
 pub mod cube_face;
 mod depth_hierarchy;
 mod env_map_irradiance;

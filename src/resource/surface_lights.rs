@@ -122,7 +122,8 @@ impl SurfaceLights {
         }
         let is_bad = |p: &SurfacePlace| {
             let is_unit = (p.normal.length_squared() - 1.0).abs() < 1e-3;
-            !(p.position.is_finite() && is_unit && p.area >= 0.0 && p.area.is_finite())
+            let has_areas = p.areas.iter().all(|area| *area >= 0.0 && area.is_finite());
+            !(p.position.is_finite() && is_unit && has_areas)
         };
         if let Some(index) = places.iter().position(is_bad) {
             let problem = "has a position or an area that is not finite, or a normal that is not of length one";
@@ -134,7 +135,7 @@ impl SurfaceLights {
             let surface = *numbers.entry(p.surface).or_insert(next);
             [(1.0, 0), (-1.0, 1)].map(|(side, back)| gpu::SurfaceLight {
                 position: frame.point(p.position).to_array(),
-                area: frame.area(p.area),
+                area: frame.area(p.areas[back as usize]),
                 normal: (side * p.normal).as_vec3().to_array(),
                 surface: surface + back,
             })

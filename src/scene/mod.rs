@@ -12,6 +12,8 @@ mod light;
 mod light_sources;
 mod material;
 mod mesh;
+#[cfg(feature = "bvh")]
+mod open_surface;
 #[cfg(feature = "samples")]
 pub mod samples;
 mod summary;

@@ -20,8 +20,8 @@ const SAMPLES_A_CELL: f64 = 256.0;
 /// No more of an instance.
 const MOST_SAMPLES: u32 = 1 << 20;
 
-/// The least area of a point, as a share of the mean.
-const LEAST_CELL: f64 = 0.02;
+/// The least share of the surface around a point that lies open on a side, or the point keeps no light on it.
+const LEAST_OPEN: f64 = 0.25;
 
 /// What an angle costs where no point faces the same way, over the square of the scene's scale: about as in
 /// `shaders/common/nearest_surface_light.wgsl`.
@@ -40,8 +40,9 @@ pub struct SurfacePoint {
     pub position: Vec3,
     /// Normal of the triangle that it lies on, on its front; mesh space, unit.
     pub normal: Vec3,
-    /// World units squared, one side: what lies nearer to it than to others, from samples, to some hundredths.
-    pub area: f64,
+    /// World units squared, on its front and on its back: what lies nearer to it than to others, from samples, to some
+    /// hundredths, and is not hidden where parts of the scene stand in one another. 0: no light comes there.
+    pub areas: [f64; 2],
     /// As in [`SurfacePlace`]: numbers of the parts of instances that have no sharp edges ([`SurfacePartition`]).
     pub surface: u32,
 }
@@ -49,7 +50,8 @@ pub struct SurfacePoint {
 impl SurfacePoint {
     /// Places `count` points on a scene, as evenly as may be, away from the edges of triangles, and at least one on each
     /// instance that has an area: with more such instances than `count`, as many as instances. Deterministic. Takes time in
-    /// proportion to the triangles and to `count` squared.
+    /// proportion to the triangles and to `count` squared. What of their surface lies open is looked for by rays, with the
+    /// feature `bvh`, as of when they are placed.
     ///
     /// Source: photon streaming with virtual surface lights, section 0.4.2 and Algorithm 1: points are placed in shrunk
     /// triangles by area, too many, and of the two that lie closest the one whose second neighbour is closer goes, until
@@ -74,9 +76,9 @@ impl SurfacePoint {
             placed.extend((0..number).map(|i| sampled.point(instance, i as u32 + 1, SHRUNK)));
         }
         thin_out(&mut placed, count);
-        let areas = cell_areas(&sampled, &placed);
-        let with_area = |(p, area): (Placed, f64)| Self { area, ..p.point };
-        placed.into_iter().zip(areas).map(with_area).collect()
+        let areas = cell_areas(scene, &sampled, &placed);
+        let measured = |(p, areas): (Placed, [f64; 2])| Self { areas, ..p.point };
+        placed.into_iter().zip(areas).map(measured).collect()
     }
 
     /// Where it is in the world, under its instance's transform.
@@ -85,7 +87,7 @@ impl SurfacePoint {
         SurfacePlace {
             position: transform.transform_point3(self.position.as_dvec3()),
             normal: (normals * self.normal.as_dvec3()).normalize_or(DVec3::Y),
-            area: self.area,
+            areas: self.areas,
             surface: self.surface,
         }
     }
@@ -98,8 +100,8 @@ pub struct SurfacePlace {
     pub position: DVec3,
     /// Unit.
     pub normal: DVec3,
-    /// World units squared.
-    pub area: f64,
+    /// World units squared, on the side of the normal and on the other. 0: no light is kept there.
+    pub areas: [f64; 2],
     /// Which surface it is on: places of the same number are updated together where light is kept
     /// ([`IlluminationMap`](crate::resource::IlluminationMap)).
     pub surface: u32,
@@ -177,7 +179,7 @@ impl<'a> SampledInstance<'a> {
             instance,
             position: (middle + extent * (within - middle)).as_vec3(),
             normal: (b - a).cross(c - a).normalize_or(DVec3::Y).as_vec3(),
-            area: 0.0,
+            areas: [0.0; 2],
             surface: self.first_surface + self.surfaces.of_triangles()[triangle],
         };
         Placed {
@@ -187,27 +189,71 @@ impl<'a> SampledInstance<'a> {
     }
 }
 
-/// How much surface lies nearer to each point than to any other that faces the same way, as surface lights see it: from a
-/// number of samples for each point, spread by area.
-fn cell_areas(instances: &[SampledInstance<'_>], placed: &[Placed]) -> Vec<f64> {
+/// How much open surface lies nearer to each point than to any other that faces the same way, as surface lights see it, on its
+/// front and on its back: from a number of samples for each point, spread by area. Of points that are mostly hidden on a side,
+/// what lies open around goes to others.
+fn cell_areas(scene: &Scene, instances: &[SampledInstance<'_>], placed: &[Placed]) -> Vec<[f64; 2]> {
     let total: f64 = instances.iter().map(|i| i.area).sum();
-    let mut areas = vec![0.0; placed.len()];
     if placed.is_empty() || total <= 0.0 {
-        return areas;
+        return vec![[0.0; 2]; placed.len()];
     }
-    let cells = Cells::new(placed, (total / placed.len() as f64).sqrt());
+    let is_open = open_on_sides(scene);
+    let mut samples = Vec::new();
     for (index, instance) in instances.iter().enumerate() {
         let share = instance.area / total * placed.len() as f64;
         let count = ((SAMPLES_A_CELL * share).ceil() as u32).min(MOST_SAMPLES);
-        for i in 0..count {
-            let sample = instance.point(index, i + 1, 1.0).place;
-            areas[cells.nearest(placed, &sample)] += instance.area / f64::from(count);
+        samples.extend((0..count).map(|i| {
+            let place = instance.point(index, i + 1, 1.0).place;
+            let area = instance.area / f64::from(count);
+            Sample {
+                areas: is_open(&place, i).map(|open| if open { area } else { 0.0 }),
+                area,
+                place,
+            }
+        }));
+    }
+    // Sides by the signs of normals: all of them, then those that are open.
+    let cells = Cells::new(placed, (total / placed.len() as f64).sqrt());
+    let mut all = vec![[0.0; 2]; placed.len()];
+    let mut open = all.clone();
+    let kept = vec![[true; 2]; placed.len()];
+    for sample in &samples {
+        for side in [0, 1] {
+            let (point, own) = cells.nearest(placed, &kept, (&sample.place, side));
+            all[point][own] += sample.area;
+            open[point][own] += sample.areas[side];
         }
     }
-    // Hidden between others: a little, not nothing.
-    let least = LEAST_CELL * total / placed.len() as f64;
-    areas.iter_mut().for_each(|area| *area = area.max(least));
+    let is_kept = |(all, open): (&[f64; 2], &[f64; 2])| [0, 1].map(|s| open[s] >= LEAST_OPEN * all[s] && open[s] > 0.0);
+    let kept: Vec<_> = all.iter().zip(&open).map(is_kept).collect();
+    let mut areas = vec![[0.0; 2]; placed.len()];
+    for sample in &samples {
+        for side in [0, 1] {
+            let (point, own) = cells.nearest(placed, &kept, (&sample.place, side));
+            areas[point][own] += sample.areas[side];
+        }
+    }
     areas
+}
+
+/// A place on a surface, how much surface it stands for, and how much of that lies open on either side.
+struct Sample {
+    place: SurfacePlace,
+    area: f64,
+    areas: [f64; 2],
+}
+
+/// Whether a place lies open on the side of its normal, and on the other.
+fn open_on_sides(scene: &Scene) -> impl Fn(&SurfacePlace, u32) -> [bool; 2] {
+    #[cfg(feature = "bvh")]
+    let surface = super::open_surface::OpenSurface::new(scene);
+    #[cfg(feature = "bvh")]
+    return move |place: &SurfacePlace, index| surface.is_open(place, index);
+    #[cfg(not(feature = "bvh"))]
+    {
+        let _ = scene;
+        |_: &SurfacePlace, _| [true; 2]
+    }
 }
 
 fn cell_of(position: DVec3, side: f64) -> [i64; 3] {
@@ -229,16 +275,18 @@ impl Cells {
         Self { side, points }
     }
 
-    /// The point that is nearest to a place and faces the same way on one of its sides, distances off the place's plane counted
-    /// as surface lights do; where none does, the nearest that faces least apart.
-    fn nearest(&self, placed: &[Placed], own: &SurfacePlace) -> usize {
-        let cost = |&point: &usize| {
+    /// The point, and its side, that is nearest to a side of a place and faces the same way, of those that are kept; distances off
+    /// the place's plane counted as surface lights do. Where none does, the nearest that faces least apart.
+    fn nearest(&self, placed: &[Placed], kept: &[[bool; 2]], (own, side): (&SurfacePlace, usize)) -> (usize, usize) {
+        let cost = |point: usize| {
             let away = placed[point].place.position - own.position;
             away.length_squared() + OFF_PLANE * away.dot(own.normal).powi(2)
         };
-        // Each place has a light on either side.
-        let cosine = |point: usize| placed[point].place.normal.dot(own.normal).abs();
-        let is_facing = |point: &&usize| cosine(**point) >= SAME_WAY;
+        let cosine = |point: usize| placed[point].place.normal.dot(own.normal);
+        // Of the two sides of a point the one that faces the same way.
+        let facing_side = |point: usize| if cosine(point) < 0.0 { 1 - side } else { side };
+        let faces = |point: &usize| cosine(*point).abs() >= SAME_WAY && kept[*point][facing_side(*point)];
+        let nearer = |a: &usize, b: &usize| cost(*a).total_cmp(&cost(*b));
         let middle = cell_of(own.position, self.side);
         for rings in 1..=3i64 {
             let width = 2 * rings + 1;
@@ -246,21 +294,25 @@ impl Cells {
                 let offset = [i % width, i / width % width, i / width.pow(2)];
                 [0, 1, 2].map(|axis: usize| middle[axis] + offset[axis] - rings)
             });
-            let near = around.filter_map(|cell| self.points.get(&cell)).flatten();
-            let near = near.filter(is_facing);
-            let found = near.min_by(|a, b| cost(a).total_cmp(&cost(b)));
+            let near = around.filter_map(|cell| self.points.get(&cell)).flatten().copied();
+            let found = near.filter(|p| faces(p)).min_by(nearer);
             // Whatever lies in other cells is this far away at least.
             let reach = (rings as f64 * self.side).powi(2);
-            if let Some(found) = found.filter(|f| cost(f) <= reach) {
-                return *found;
+            if let Some(found) = found.filter(|f| cost(*f) <= reach) {
+                return (found, facing_side(found));
             }
         }
-        let facing = (0..placed.len()).filter(|p| is_facing(&p));
-        let any = |&p: &usize| placed[p].place.position.distance_squared(own.position) + APART * (1.0 - cosine(p));
-        facing
-            .min_by(|a, b| cost(a).total_cmp(&cost(b)))
-            .or_else(|| (0..placed.len()).min_by(|a, b| any(a).total_cmp(&any(b))))
-            .unwrap_or(0)
+        if let Some(found) = (0..placed.len()).filter(faces).min_by(nearer) {
+            return (found, facing_side(found));
+        }
+        let sides = (0..placed.len()).flat_map(|point| [(point, 0), (point, 1)]);
+        let apart = |&(point, s): &(usize, usize)| {
+            let away = placed[point].place.position.distance_squared(own.position);
+            let cosine = if s == side { cosine(point) } else { -cosine(point) };
+            away + APART * (1.0 - cosine)
+        };
+        let kept = sides.filter(|&(point, s)| kept[point][s]);
+        kept.min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or((0, side))
     }
 }
 
@@ -451,8 +503,13 @@ mod tests {
                 assert!(own > 0, "{count}: instance {i}");
             }
             // But for a little of those that are hidden between others.
-            let sum: f64 = points.iter().map(|p| p.area).sum();
-            assert!(sum >= (1.0 - 1e-9) * all && sum < 1.02 * all, "{count}: {sum} of {all}");
+            let sum = |side: usize| points.iter().map(|p| p.areas[side]).sum::<f64>();
+            assert!(
+                sum(0) > 0.9 * all && sum(0) < 1.001 * all,
+                "{count}: {} of {all}",
+                sum(0)
+            );
+            assert!(sum(1) < 1.001 * all, "{count}: {} of {all}", sum(1));
             assert!(
                 points.len() == count.max(scene.instances.len()),
                 "{count}: {}",
@@ -485,9 +542,9 @@ mod tests {
             let from = if i == 0 { 0.0 } else { ends[i - 1] };
             let to = ends.get(i).copied().unwrap_or(10.0);
             assert!(
-                (p.area / (0.1 * (to - from)) - 1.0).abs() < 0.05,
+                (p.areas[0] / (0.1 * (to - from)) - 1.0).abs() < 0.05,
                 "{i}: {} of {}",
-                p.area,
+                p.areas[0],
                 0.1 * (to - from)
             );
         }

@@ -1,4 +1,4 @@
-//! Trees over boxes: binary ones built by the surface-area heuristic, collapsed by `obvhs` into compressed nodes of eight
+//! Beside the layers: trees over boxes, binary ones built by the surface-area heuristic, collapsed by `obvhs` into compressed nodes of eight
 //! children (Ylitie et al. 2017).
 //!
 //! The binary tree is built here, from the top down (Wald 2007, "On fast construction of SAH-based bounding volume
@@ -106,7 +106,6 @@ struct Item {
 }
 
 /// A tree of two children a node, for rays that the processor follows.
-#[cfg(not(target_arch = "wasm32"))]
 pub(crate) fn binary_tree(boxes: impl ExactSizeIterator<Item = Aabb>) -> Bvh2 {
     match boxes.len() {
         0 => Bvh2::default(),
