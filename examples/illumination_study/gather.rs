@@ -8,11 +8,13 @@ use crate::common::adapter::Gpu;
 use crate::common::clock::median;
 use crate::common::offline::{self, Component, Offline};
 use crate::common::reference::Reference;
-use lightfall::frame::{IndirectMethod, Settings};
+use lightfall::frame::{IndirectMethod, Settings, TexelGatherMethod};
 use lightfall::glam::{DAffine3, DVec3, Vec3};
-use lightfall::read_buffer_blocking;
+use lightfall::pass::{HemisphereGather, HemisphereGatherInputs, HemisphereGatherResources};
 use lightfall::reference::{PathComponent, PathTracerSettings};
+use lightfall::resource::{GatherShape, Geometry, HemispherePlace, Hemispheres, PrepareContext};
 use lightfall::scene::{Camera, Projection, Scene, samples};
+use lightfall::{Error, read_buffer_blocking};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::time::Instant;
@@ -75,7 +77,8 @@ struct Point {
 }
 
 /// Texels that see their surroundings, and light, in an order of their own.
-fn points(gpu: &Gpu, offline: &Offline<'_>, light: &[[f32; 4]], count: usize) -> Result<Vec<Point>, String> {
+fn points(gpu: &Gpu, offline: &Offline<'_>, count: usize) -> Result<Vec<Point>, String> {
+    let light = gathered(gpu, offline)?;
     let mut texels: Vec<usize> = (0..2 * offline.points.len()).collect();
     texels.sort_by_cached_key(|&texel| {
         let mut hasher = DefaultHasher::new();
@@ -163,55 +166,104 @@ pub(crate) fn errors(gpu: &Gpu, arguments: &Arguments) -> Result<(), String> {
     let mut head = String::from("| error: median, 95th percentile, share within 1 % |");
     for name in &arguments.samples {
         let scene = samples::by_name(name, 0.3).ok_or_else(|| format!("there is no sample {name}"))?;
-        let mut truths = Vec::new();
-        let mut chosen = Vec::new();
-        for ((way, overrides), row) in ways.iter().zip(&mut rows) {
+        let filled = |way: &str, overrides| {
             let mut settings = settings([arguments.places, arguments.photons, arguments.bounces], overrides)?;
             if way.contains("environment") {
                 settings.set("tracer.kind", "image-space").map_err(|e| e.to_string())?;
             }
-            let t = Instant::now();
             let mut offline = offline(gpu, &scene, &settings)?;
-            eprintln!("new {:?}", t.elapsed());
             offline.render_frame(None).map_err(|e| e.to_string())?;
-            eprintln!("frame {:?}", t.elapsed());
-            let light = gathered(gpu, &offline)?;
-            if chosen.is_empty() {
-                chosen = points(gpu, &offline, &light, arguments.points)?;
-                truths = all_truths(gpu, arguments, &scene, &chosen)?;
-                eprintln!("truth {:?}", t.elapsed());
-                let noise: Vec<f64> = truths.iter().map(|t| t[1] / t[0]).collect();
-                head += &format!(" {name} (noise {:.2} %) |", 100.0 * median(&noise));
-            }
-            let frame = offline.renderer.frame().ok_or("no frame")?;
+            Ok::<_, String>((settings, offline))
+        };
+        let (_, mut base) = filled("", &[])?;
+        let points = points(gpu, &base, arguments.points)?;
+        let truths = all_truths(gpu, arguments, &scene, &points)?;
+        let noise: Vec<f64> = truths.iter().map(|t| t[1] / t[0]).collect();
+        head += &format!(" {name} (noise {:.2} %) |", 100.0 * median(&noise));
+        for ((way, overrides), row) in ways.iter().zip(&mut rows) {
+            let settings = settings([arguments.places, arguments.photons, arguments.bounces], overrides)?;
+            let light = match shape(&settings) {
+                Some(shape) => drawn(
+                    gpu,
+                    &mut base,
+                    (shape, settings.illumination_maps.hemisphere_size),
+                    &points,
+                )?,
+                None => gathered(gpu, &filled(way, overrides)?.1)?,
+            };
+            let frame = base.renderer.frame().ok_or("no frame")?;
             // Of the unit frame, in world units.
             let scale = f64::from(frame.output_scale(1.0).map_err(|e| e.to_string())?);
-            let errors: Vec<f64> = chosen
-                .iter()
-                .zip(&truths)
-                .map(|(point, truth)| {
-                    let own: f64 = light[point.texel][..3].iter().map(|&v| f64::from(v) * scale).sum();
-                    (own / truth[0] - 1.0).abs()
-                })
-                .collect();
-            for ((e, p), t) in errors.iter().zip(&chosen).zip(&truths) {
-                if *e > 0.01 {
-                    eprintln!(
-                        "{way} {:.4} at {:.2?} {:.2?} noise {:.4} truth {:.3}",
-                        e,
-                        p.position.to_array(),
-                        p.normal.to_array(),
-                        t[1] / t[0],
-                        t[0]
-                    );
-                }
-            }
-            *row += &format!(" {} |", summary(errors));
+            let error = |(point, truth): (&Point, &[f64; 2])| {
+                let own: f64 = light[point.texel][..3].iter().map(|&v| f64::from(v) * scale).sum();
+                (own / truth[0] - 1.0).abs()
+            };
+            *row += &format!(" {} |", summary(points.iter().zip(&truths).map(error).collect()));
         }
     }
     println!("{head}\n|{}", "---|".repeat(arguments.samples.len() + 1));
     rows.iter().for_each(|row| println!("{row}"));
     Ok(())
+}
+
+/// What draws go onto, if they gather.
+fn shape(settings: &Settings) -> Option<GatherShape> {
+    let own = &settings.illumination_maps;
+    match own.method {
+        TexelGatherMethod::Rays => None,
+        TexelGatherMethod::Cube => Some(GatherShape::Cube),
+        TexelGatherMethod::Plane => Some(GatherShape::Plane {
+            half_side: own.half_side,
+        }),
+    }
+}
+
+/// Of all texels, after those of the points were gathered by draws, from the light that there is.
+fn drawn(
+    gpu: &Gpu,
+    offline: &mut Offline<'_>,
+    tile: (GatherShape, u32),
+    points: &[Point],
+) -> Result<Vec<[f32; 4]>, String> {
+    let (device, queue) = (&gpu.device, &gpu.queue);
+    let frame = *offline.renderer.frame().ok_or("no frame")?;
+    let place = |point: &Point| HemispherePlace {
+        position: frame.point(point.position),
+        normal: point.normal.as_vec3(),
+        texel: point.texel as u32,
+    };
+    let pass = HemisphereGather::new(device);
+    let mut draw = || -> Result<(), Error> {
+        let mut resources = HemisphereGatherResources::new(device)?;
+        let mut hemispheres = Hemispheres::new(device, queue, tile, points.len() as u32)?;
+        hemispheres.set(queue, &points.iter().map(place).collect::<Vec<_>>())?;
+        let mut views = hemispheres.views();
+        (0..).zip(&mut views).for_each(|(index, view)| view.index = index);
+        let context = PrepareContext {
+            device,
+            queue,
+            frame: &frame,
+        };
+        offline.geometry.prepare(&context, &views)?;
+        let (Some(lights), Some(map)) = (offline.renderer.surface_lights(), offline.renderer.illumination_map()) else {
+            return Ok(());
+        };
+        let inputs = HemisphereGatherInputs {
+            queue,
+            hemispheres: &hemispheres,
+            geometry: &offline.geometry,
+            views: &views,
+            lights,
+            map,
+            timestamps: None,
+        };
+        let mut encoder = device.create_command_encoder(&Default::default());
+        pass.record(&mut encoder, &mut resources, &inputs)?;
+        queue.submit([encoder.finish()]);
+        Ok(())
+    };
+    draw().map_err(|e| e.to_string())?;
+    gathered(gpu, offline)
 }
 
 fn all_truths(gpu: &Gpu, arguments: &Arguments, scene: &Scene, points: &[Point]) -> Result<Vec<[f64; 2]>, String> {

@@ -520,6 +520,32 @@ mod tests {
     }
 
     #[test]
+    #[cfg(feature = "bvh")]
+    fn what_blocks_stand_on_has_no_area() {
+        let scene = samples::cornell(0.0);
+        let points = SurfacePoint::place(&scene, 600);
+        let of_instance = |name: &str| {
+            let index = scene.instances.iter().position(|i| i.name == name).unwrap();
+            let sampled = SampledInstance::new(&scene.meshes[scene.instances[index].mesh], &scene.instances[index]);
+            let own = points.iter().filter(|p| p.instance == index);
+            (sampled.area, own.map(|p| p.areas[0]).sum::<f64>())
+        };
+        // The top of a block is as large as what it stands on.
+        let footprint = |name: &str| {
+            let index = scene.instances.iter().position(|i| i.name == name).unwrap();
+            let p = &scene.meshes[scene.instances[index].mesh].positions;
+            let [a, b, c, d] = [0, 1, 2, 3].map(|i| Vec3::from(p[i]).as_dvec3());
+            0.5 * ((b - a).cross(c - a).length() + (c - a).cross(d - a).length())
+        };
+        let (floor, open) = of_instance("floor");
+        let wanted = floor - footprint("short block") - footprint("tall block");
+        println!("{open:.3} m² of {floor:.3} lie open, {wanted:.3} wanted");
+        assert!((open / wanted - 1.0).abs() < 0.01);
+        let (ceiling, open) = of_instance("ceiling");
+        assert!((open / ceiling - 1.0).abs() < 0.01);
+    }
+
+    #[test]
     fn areas_are_those_of_voronoi_cells() {
         // Points in a row along a strip: cells end halfway between.
         let strip = crate::scene::Mesh {
