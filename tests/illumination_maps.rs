@@ -110,6 +110,72 @@ fn pixels_have_the_light_that_paths_find() {
     assert_no_errors(&gpu);
 }
 
+/// Root mean square of how far light at texels is off, over all of it, and its bias; of texels that stand in the open.
+fn off(own: &[(Vec3, [f32; 4])], truth: &[(Vec3, [f32; 4])]) -> [f64; 2] {
+    let pairs = own.iter().zip(truth).filter(|(_, t)| t.1[3] > 0.999);
+    let mut sums = [0.0; 4];
+    for (own, truth) in pairs {
+        for c in 0..3 {
+            let (own, truth) = (f64::from(own.1[c]), f64::from(truth.1[c]));
+            let own_sums = [(own - truth).powi(2), truth * truth, own, truth];
+            (0..4).for_each(|i| sums[i] += own_sums[i]);
+        }
+    }
+    [(sums[0] / sums[1]).sqrt(), sums[2] / sums[3] - 1.0]
+}
+
+#[test]
+fn rays_that_go_where_photons_came_from_err_less() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::cornell(0.3);
+    let by = |rays: &str, guided: &str| {
+        let settings = settings(&[
+            ("photons", "200000"),
+            ("illumination_maps.rays", rays),
+            ("illumination_maps.guided", guided),
+        ]);
+        texels(&gpu, &offline(&gpu, &scene, &settings))
+    };
+    let truth = by("4096", "0");
+    let [even, half, most] = ["0", "0.5", "0.9"].map(|guided| off(&by("64", guided), &truth));
+    println!("64 rays, error and bias: even {even:.4?}, half guided {half:.4?}, nine tenths {most:.4?}");
+    assert!(half[0] < 0.8 * even[0]);
+    assert!([even, half, most].iter().all(|e| e[1].abs() < 0.02));
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn texels_of_few_photons_take_the_light_around_them() {
+    let Some(gpu) = gpu() else { return };
+    let scene = rooms(1.0);
+    let radiosity = |least: &str| {
+        let settings = settings(&[("photons", "4000"), ("illumination_maps.least_photons", least)]);
+        let offline = offline(&gpu, &scene, &settings);
+        let lights = offline.renderer.surface_lights().unwrap();
+        let map = offline.renderer.illumination_map().unwrap();
+        let read = |buffer| read_buffer_blocking::<[f32; 4]>(&gpu.device, &gpu.queue, buffer).unwrap();
+        let areas: Vec<f32> = read(lights.records()).iter().step_by(2).map(|r| r[3]).collect();
+        let light: Vec<[f32; 4]> = read(map.radiosity());
+        light.into_iter().zip(areas).collect::<Vec<_>>()
+    };
+    let (own, around) = (radiosity("0"), radiosity("50"));
+    let lit = |all: &[([f32; 4], f32)]| all.iter().filter(|t| t.0[0] > 0.0).count();
+    let few = |all: &[([f32; 4], f32)]| all.iter().filter(|t| t.0[0] > 0.0 && t.0[3] < 50.0).count();
+    let sent = |all: &[([f32; 4], f32)]| all.iter().map(|t| f64::from(t.0[0] * t.1)).sum::<f64>();
+    println!(
+        "lit {} and {}, of few photons {} and {}, light {:.4} and {:.4}",
+        lit(&own),
+        lit(&around),
+        few(&own),
+        few(&around),
+        sent(&own),
+        sent(&around)
+    );
+    assert!(few(&own) > lit(&own) / 2 && few(&around) < few(&own) / 2);
+    assert!((sent(&around) / sent(&own) - 1.0).abs() < 0.1);
+    assert_no_errors(&gpu);
+}
+
 #[test]
 fn while_nothing_changes_no_texel_is_gathered_and_no_bit_changes() {
     let Some(gpu) = gpu() else { return };

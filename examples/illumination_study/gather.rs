@@ -8,7 +8,7 @@ use crate::common::adapter::Gpu;
 use crate::common::clock::median;
 use crate::common::offline::{self, Component, Offline};
 use crate::common::reference::Reference;
-use lightfall::frame::{IndirectMethod, Settings, TexelGatherMethod};
+use lightfall::frame::{IlluminationMapSettings, IndirectMethod, Settings, TexelGatherMethod};
 use lightfall::glam::{DAffine3, DVec3, Vec3};
 use lightfall::pass::{HemisphereGather, HemisphereGatherInputs, HemisphereGatherResources};
 use lightfall::reference::{PathComponent, PathTracerSettings};
@@ -183,12 +183,12 @@ pub(crate) fn errors(gpu: &Gpu, arguments: &Arguments) -> Result<(), String> {
         for ((way, overrides), row) in ways.iter().zip(&mut rows) {
             let settings = settings([arguments.places, arguments.photons, arguments.bounces], overrides)?;
             let light = match shape(&settings) {
-                Some(shape) => drawn(
-                    gpu,
-                    &mut base,
-                    (shape, settings.illumination_maps.hemisphere_size),
-                    &points,
-                )?,
+                Some(shape) => {
+                    let tile = (shape, settings.illumination_maps.hemisphere_size);
+                    let mut draw = || Draws::new(gpu, &base, tile, &points)?.gather(gpu, &mut base);
+                    draw().map_err(|e| e.to_string())?;
+                    gathered(gpu, &base)?
+                }
                 None => gathered(gpu, &filled(way, overrides)?.1)?,
             };
             let frame = base.renderer.frame().ok_or("no frame")?;
@@ -218,39 +218,49 @@ fn shape(settings: &Settings) -> Option<GatherShape> {
     }
 }
 
-/// Of all texels, after those of the points were gathered by draws, from the light that there is.
-fn drawn(
-    gpu: &Gpu,
-    offline: &mut Offline<'_>,
-    tile: (GatherShape, u32),
-    points: &[Point],
-) -> Result<Vec<[f32; 4]>, String> {
-    let (device, queue) = (&gpu.device, &gpu.queue);
-    let frame = *offline.renderer.frame().ok_or("no frame")?;
-    let place = |point: &Point| HemispherePlace {
-        position: frame.point(point.position),
-        normal: point.normal.as_vec3(),
-        texel: point.texel as u32,
-    };
-    let pass = HemisphereGather::new(device);
-    let mut draw = || -> Result<(), Error> {
-        let mut resources = HemisphereGatherResources::new(device)?;
+/// Draws of some points, in tiles of their own.
+struct Draws {
+    pass: HemisphereGather,
+    resources: HemisphereGatherResources,
+    hemispheres: Hemispheres,
+}
+
+impl Draws {
+    fn new(gpu: &Gpu, offline: &Offline<'_>, tile: (GatherShape, u32), points: &[Point]) -> Result<Self, Error> {
+        let (device, queue) = (&gpu.device, &gpu.queue);
         let mut hemispheres = Hemispheres::new(device, queue, tile, points.len() as u32)?;
-        hemispheres.set(queue, &points.iter().map(place).collect::<Vec<_>>())?;
-        let mut views = hemispheres.views();
+        if let Some(frame) = offline.renderer.frame() {
+            let place = |point: &Point| HemispherePlace {
+                position: frame.point(point.position),
+                normal: point.normal.as_vec3(),
+                texel: point.texel as u32,
+            };
+            hemispheres.set(queue, &points.iter().map(place).collect::<Vec<_>>())?;
+        }
+        Ok(Self {
+            pass: HemisphereGather::new(device),
+            resources: HemisphereGatherResources::new(device)?,
+            hemispheres,
+        })
+    }
+
+    /// Gathers at all of the points from the light that there is, and waits.
+    fn gather(&mut self, gpu: &Gpu, offline: &mut Offline<'_>) -> Result<(), Error> {
+        let (device, queue) = (&gpu.device, &gpu.queue);
+        let mut views = self.hemispheres.views();
         (0..).zip(&mut views).for_each(|(index, view)| view.index = index);
-        let context = PrepareContext {
-            device,
-            queue,
-            frame: &frame,
-        };
-        offline.geometry.prepare(&context, &views)?;
-        let (Some(lights), Some(map)) = (offline.renderer.surface_lights(), offline.renderer.illumination_map()) else {
+        let renderer = &offline.renderer;
+        let (Some(frame), Some(lights), Some(map)) =
+            (renderer.frame(), renderer.surface_lights(), renderer.illumination_map())
+        else {
             return Ok(());
         };
+        offline
+            .geometry
+            .prepare(&PrepareContext { device, queue, frame }, &views)?;
         let inputs = HemisphereGatherInputs {
             queue,
-            hemispheres: &hemispheres,
+            hemispheres: &self.hemispheres,
             geometry: &offline.geometry,
             views: &views,
             lights,
@@ -258,12 +268,10 @@ fn drawn(
             timestamps: None,
         };
         let mut encoder = device.create_command_encoder(&Default::default());
-        pass.record(&mut encoder, &mut resources, &inputs)?;
+        self.pass.record(&mut encoder, &mut self.resources, &inputs)?;
         queue.submit([encoder.finish()]);
-        Ok(())
-    };
-    draw().map_err(|e| e.to_string())?;
-    gathered(gpu, offline)
+        offline::wait(device)
+    }
 }
 
 fn all_truths(gpu: &Gpu, arguments: &Arguments, scene: &Scene, points: &[Point]) -> Result<Vec<[f64; 2]>, String> {
@@ -307,27 +315,44 @@ pub(crate) fn times(gpu: &Gpu, arguments: &Arguments) -> Result<(), String> {
     Ok(())
 }
 
-/// Places of the table of times.
+/// Places, and texels that draws are timed with.
 const TIMED_PLACES: u32 = 500;
+const TIMED_TEXELS: usize = 50;
 
 fn seconds_of_texel(gpu: &Gpu, scene: &Scene, overrides: Overrides) -> Result<f64, String> {
     let settings = settings([TIMED_PLACES, 1000, 1], overrides)?;
-    let mut offline = offline(gpu, scene, &settings)?;
-    let mut time = |is_filled: bool| {
-        let mut all = Vec::new();
-        for _ in 0..5 {
-            if is_filled {
-                offline.refill();
-            }
-            let start = Instant::now();
-            offline.render_frame(None).map_err(|e| e.to_string())?;
-            offline::wait(&gpu.device).map_err(|e| e.to_string())?;
-            all.push(start.elapsed().as_secs_f64());
-        }
-        Ok::<_, String>(median(&all))
+    let rays = Settings {
+        illumination_maps: IlluminationMapSettings {
+            method: TexelGatherMethod::Rays,
+            ..settings.illumination_maps
+        },
+        ..settings.clone()
     };
-    let with = time(true)?;
-    let without = time(false)?;
-    let texels = 2 * offline.points.len();
-    Ok((with - without) / texels as f64)
+    let mut offline = offline(gpu, scene, &rays)?;
+    let frame = |offline: &mut Offline<'_>| offline.render_frame(None).map_err(|e| e.to_string());
+    if let Some(shape) = shape(&settings) {
+        frame(&mut offline)?;
+        let points = points(gpu, &offline, TIMED_TEXELS)?;
+        let tile = (shape, settings.illumination_maps.hemisphere_size);
+        let mut draws = Draws::new(gpu, &offline, tile, &points).map_err(|e| e.to_string())?;
+        let seconds = timed(&mut || draws.gather(gpu, &mut offline).map_err(|e| e.to_string()))?;
+        return Ok(seconds / points.len() as f64);
+    }
+    let with = timed(&mut || {
+        offline.refill();
+        frame(&mut offline)
+    })?;
+    let without = timed(&mut || frame(&mut offline))?;
+    Ok((with - without) / (2 * offline.points.len()) as f64)
+}
+
+/// Median of five times, of six.
+fn timed(work: &mut dyn FnMut() -> Result<(), String>) -> Result<f64, String> {
+    work()?;
+    let once = |_| {
+        let start = Instant::now();
+        work().map(|()| start.elapsed().as_secs_f64())
+    };
+    let all = (0..5).map(once).collect::<Result<Vec<_>, _>>()?;
+    Ok(median(&all))
 }

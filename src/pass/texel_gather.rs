@@ -120,9 +120,9 @@ pub(crate) const CHANGE_SHIFT: u32 = 4;
 /// Workgroups of a dispatch along an axis: one a texel.
 const MOST_A_FRAME: u32 = 65_535;
 
-/// Of a texel's hemisphere, where photons come from: `INCIDENT_CELLS` in `shaders/pass/texel_gather/incident_cell.wgsl`, 4 bytes
+/// Of a texel's hemisphere, where photons come from: `INCIDENT_STRIDE` in `shaders/pass/texel_gather/incident_cell.wgsl`, 4 bytes
 /// each.
-const INCIDENT_BYTES: u64 = 4 * 64;
+const INCIDENT_BYTES: u64 = 4 * 65;
 
 /// Rays that go wherever light may come from, at least: what no photon showed has a weight of its inverse.
 const MOST_GUIDED: f32 = 0.95;
@@ -146,8 +146,8 @@ pub struct TexelGatherSettings {
     /// Photons that all light at a texel is taken from, if as many lie around it on its surface: of texels with fewer, more of
     /// the surface is taken. 0: none but its own. More are smoother and blurrier.
     pub least_photons: u32,
-    /// Share of the rays that go where photons came from which had been scattered before, 0 to below 1; the others are spread as
-    /// the cosine.
+    /// Share of the rays that go where photons came from which had been scattered before, 0 to below 1, where there are many of
+    /// these, half of it where there are 128; the others are spread as the cosine.
     pub guided: f32,
 }
 
@@ -475,7 +475,7 @@ impl TexelGatherResources {
         })
     }
 
-    /// Makes room for what guides the rays of up to `a_frame` texels at once, 256 bytes each; without it none are guided.
+    /// Makes room for what guides the rays of up to `a_frame` texels at once, 260 bytes each; without it none are guided.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`].

@@ -504,8 +504,9 @@ mod tests {
             }
             // But for a little of those that are hidden between others.
             let sum = |side: usize| points.iter().map(|p| p.areas[side]).sum::<f64>();
+            // Furniture stands on things and in things.
             assert!(
-                sum(0) > 0.9 * all && sum(0) < 1.001 * all,
+                sum(0) > 0.7 * all && sum(0) < 1.001 * all,
                 "{count}: {} of {all}",
                 sum(0)
             );

@@ -22,7 +22,8 @@ fn count_incident(@builtin(global_invocation_id) id: vec3u) {
     }
     let direction = -octahedral_unpack(photons[slot].direction) * sampling_frame(lights[impact.light].normal);
     if direction.z > 0.0 {
-        let cell = (place - 1u) * INCIDENT_CELLS + incident_cell(direction);
-        atomicAdd(&incident[cell], impact.red + impact.green + impact.blue);
+        let first = (place - 1u) * INCIDENT_STRIDE;
+        atomicAdd(&incident[first + incident_cell(direction)], impact.red + impact.green + impact.blue);
+        atomicAdd(&incident[first + INCIDENT_CELLS], 1u);
     }
 }

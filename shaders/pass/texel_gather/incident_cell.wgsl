@@ -2,6 +2,8 @@
 
 const INCIDENT_SIDE: u32 = 8u;
 const INCIDENT_CELLS: u32 = 64u;
+// Of a texel's cells, and behind them how many photons.
+const INCIDENT_STRIDE: u32 = 65u;
 
 // The cell of a direction in the frame of a surface, z the cosine.
 fn incident_cell(direction: vec3f) -> u32 {

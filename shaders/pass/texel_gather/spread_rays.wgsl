@@ -15,15 +15,19 @@ struct Guided {
     density: f32,
 }
 
+// Photons, of which half of what there is to guide is guided: fewer say little of where light comes from.
+const GUIDED_BY_HALF: f32 = 128.0;
+
 // Cells are taken by the light that comes from there, and by as much as if they all were alike: the first number chooses one,
 // and, stretched, the place in it.
 fn guided(place: u32, u: vec2f) -> Guided {
-    let first = place * INCIDENT_CELLS;
+    let first = place * INCIDENT_STRIDE;
+    let photons = f32(incident[first + INCIDENT_CELLS]);
     var all = 0.0;
     for (var cell = 0u; cell < INCIDENT_CELLS; cell++) {
         all += f32(incident[first + cell]);
     }
-    let share = select(0.0, params.guided, all > 0.0);
+    let share = params.guided * photons / (photons + GUIDED_BY_HALF);
     let of_light = share / max(all, 1.0);
     let even = (1.0 - share) / f32(INCIDENT_CELLS);
     var cell = 0u;
