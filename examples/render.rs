@@ -164,6 +164,9 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     let size = [arguments.width, arguments.height];
     let mut offline =
         Offline::new(&gpu, scene, &settings, arguments.camera, size, component).map_err(|e| e.to_string())?;
+    if times.len() == 1 {
+        offline.stand_still();
+    }
     let setup_ms = setup.elapsed().as_secs_f64() * 1e3;
     let mut clock = Clock::new(&gpu);
     let bar = progress::bar(times.len() as u64 * u64::from(settings.frames));

@@ -1,4 +1,4 @@
-//! Beside the layers: trees over boxes, binary ones built by the surface-area heuristic, collapsed by `obvhs` into compressed nodes of eight
+//! Beside the layers, for any of them: trees over boxes, binary ones built by the surface-area heuristic, collapsed by `obvhs` into compressed nodes of eight
 //! children (Ylitie et al. 2017).
 //!
 //! The binary tree is built here, from the top down (Wald 2007, "On fast construction of SAH-based bounding volume

@@ -188,6 +188,13 @@ impl<'a> Offline<'a> {
         wait(device)
     }
 
+    /// Says that nothing of the scene will move: surface that is hidden in it keeps no light.
+    pub(crate) fn stand_still(&mut self) {
+        if !self.points.is_empty() {
+            self.points = SurfacePoint::place_in_still_scene(&self.scene, self.points.len());
+        }
+    }
+
     /// Has the next frame gather all of an illumination map anew.
     pub(crate) fn refill(&mut self) {
         self.is_first = true;

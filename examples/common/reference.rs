@@ -1,13 +1,15 @@
 //! Renders a scene by path tracing: the same camera and components as `offline`, without its approximations.
 
 use super::adapter::Gpu;
+use lightfall::glam::{DAffine3, DVec3};
 use lightfall::reference::metrics::Truth;
 use lightfall::reference::{
     Emitters, PathEstimate, PathTracer, PathTracerInputs, PathTracerResources, PathTracerSettings,
 };
 use lightfall::resource::{BvhGeometry, BvhGeometryConfig, Radiance};
-use lightfall::scene::{Camera, Scene, SceneSummary, UnitFrame};
+use lightfall::scene::{Camera, Projection, Scene, SceneSummary, UnitFrame};
 use lightfall::{Error, Timestamps};
+use std::f64::consts::{FRAC_PI_2, PI};
 
 /// The preset that is no `Settings`.
 pub(crate) const PRESET: &str = "reference";
@@ -57,9 +59,47 @@ impl<'a> Reference<'a> {
     }
 
     /// Begins anew with another camera.
-    pub(crate) fn look(&mut self, camera: Camera) {
+    fn look(&mut self, camera: Camera) {
         self.scene.cameras[self.camera] = camera;
         self.resources.restart();
+    }
+
+    /// Irradiance that surfaces around a point send to it, world units, the sum of its channels, and its standard error. The
+    /// point looks around, above and, by the upper halves of four square pictures, to its sides, so that the directions of paths
+    /// are spread evenly. The reference's component is `All`: nothing may shine that can be seen.
+    pub(crate) fn irradiance(&mut self, (position, normal): (DVec3, DVec3), paths: u32) -> Result<[f64; 2], Error> {
+        let helper = if normal.y.abs() < 0.9 { DVec3::Y } else { DVec3::X };
+        let right = helper.cross(normal).normalize();
+        let ahead = normal.cross(right);
+        let eye = position + 1e-4 * f64::from(self.frame.radius()) * self.frame.length_scale() * normal;
+        let faces = [
+            (normal, ahead),
+            (right, normal),
+            (-right, normal),
+            (ahead, normal),
+            (-ahead, normal),
+        ];
+        let size = self.size[0];
+        let samples = (paths / (faces.len() as u32 * size * size)).max(1);
+        let mut sum = [0.0; 2];
+        for (face, (forward, up)) in faces.into_iter().enumerate() {
+            self.look(Camera {
+                name: String::new(),
+                transform: DAffine3::from_cols(forward.cross(up), up, -forward, eye),
+                projection: Projection::Perspective { fov_y: FRAC_PI_2 },
+            });
+            for _ in 0..samples {
+                self.render_sample(None)?;
+            }
+            let estimate = self.read()?;
+            for (pixel, (mean, error)) in (0..).zip(estimate.mean.iter().zip(&estimate.standard_error)) {
+                let weight = PI * form_factor(face == 0, [pixel % size, pixel / size], size);
+                let of_rgb = |rgb: &[f32; 3]| rgb.iter().map(|&v| f64::from(v)).sum::<f64>();
+                sum[0] += weight * of_rgb(mean);
+                sum[1] += (weight * of_rgb(error)).powi(2);
+            }
+        }
+        Ok([sum[0], sum[1].sqrt()])
     }
 
     /// Traces one more path for each pixel and waits for them.
@@ -112,6 +152,20 @@ impl<'a> Reference<'a> {
             ("PathTracer", self.resources.memory_use()),
         ]
     }
+}
+
+/// Share of the hemisphere, weighted by the cosine, that a pixel of the face above, or of one to the side, covers: from 16 points
+/// of it.
+fn form_factor(is_above: bool, pixel: [u32; 2], size: u32) -> f64 {
+    const PARTS: u32 = 4;
+    let parts = (0..PARTS).flat_map(|y| (0..PARTS).map(move |x| [x, y]));
+    let width = 2.0 / f64::from(PARTS * size);
+    let of_part = |part: [u32; 2]| {
+        let [x, y] = [0, 1].map(|i| (f64::from(PARTS * pixel[i] + part[i]) + 0.5) * width - 1.0);
+        let cosine = if is_above { 1.0 } else { (-y).max(0.0) };
+        cosine * width * width / (PI * (1.0 + x * x + y * y).powi(2))
+    };
+    parts.map(of_part).sum()
 }
 
 /// What of a difference from a reference image is noise.

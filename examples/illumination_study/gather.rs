@@ -9,34 +9,33 @@ use crate::common::clock::median;
 use crate::common::offline::{self, Component, Offline};
 use crate::common::reference::Reference;
 use lightfall::frame::{IlluminationMapSettings, IndirectMethod, Settings, TexelGatherMethod};
-use lightfall::glam::{DAffine3, DVec3, Vec3};
+use lightfall::glam::{DVec3, Vec3};
 use lightfall::pass::{HemisphereGather, HemisphereGatherInputs, HemisphereGatherResources};
 use lightfall::reference::{PathComponent, PathTracerSettings};
 use lightfall::resource::{GatherShape, Geometry, HemispherePlace, Hemispheres, PrepareContext};
-use lightfall::scene::{Camera, Projection, Scene, samples};
+use lightfall::scene::{Scene, samples};
 use lightfall::{Error, read_buffer_blocking};
-use std::f64::consts::{FRAC_PI_2, PI};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::time::Instant;
 
-/// Pixels of the picture of a point: each adds to the same mean.
+/// Pixels of each of the pictures that a point sees of its surroundings.
 const POINT_SIZE: u32 = 64;
 
 type Overrides = &'static [(&'static str, &'static str)];
 
 /// Name of a way, and settings that make it.
 const WAYS: [(&str, Overrides); 15] = [
-    ("cube of 8", &[("gather", "cube"), ("hemisphere_size", "8")]),
-    ("cube of 16", &[("gather", "cube"), ("hemisphere_size", "16")]),
-    ("cube of 32", &[("gather", "cube"), ("hemisphere_size", "32")]),
-    ("cube of 64", &[("gather", "cube"), ("hemisphere_size", "64")]),
+    ("cube of 8", &[("method", "cube"), ("hemisphere_size", "8")]),
+    ("cube of 16", &[("method", "cube"), ("hemisphere_size", "16")]),
+    ("cube of 32", &[("method", "cube"), ("hemisphere_size", "32")]),
+    ("cube of 64", &[("method", "cube"), ("hemisphere_size", "64")]),
     (
         "cube of 128",
-        &[("gather", "cube"), ("hemisphere_size", "128"), ("a_frame", "200")],
+        &[("method", "cube"), ("hemisphere_size", "128"), ("a_frame", "200")],
     ),
-    ("plane of 32, half side 1", &[("gather", "plane"), ("half_side", "1")]),
-    ("plane of 32, half side 2", &[("gather", "plane"), ("half_side", "2")]),
-    ("plane of 32, half side 3", &[("gather", "plane"), ("half_side", "3")]),
+    ("plane of 32, half side 1", &[("method", "plane"), ("half_side", "1")]),
+    ("plane of 32, half side 2", &[("method", "plane"), ("half_side", "2")]),
+    ("plane of 32, half side 3", &[("method", "plane"), ("half_side", "3")]),
     ("64 rays", &[("rays", "64"), ("guided", "0")]),
     ("256 rays", &[("rays", "256"), ("guided", "0")]),
     ("1024 rays", &[("rays", "1024"), ("guided", "0")]),
@@ -101,54 +100,6 @@ fn points(gpu: &Gpu, offline: &Offline<'_>, count: usize) -> Result<Vec<Point>, 
     Ok(texels.into_iter().filter(sees).take(count).map(point).collect())
 }
 
-/// Irradiance that paths bring to a point, the sum of its channels, and its standard error: the point looks around, above and,
-/// by the upper halves of four pictures, to its sides, so that the directions of paths are spread evenly.
-fn truth(reference: &mut Reference<'_>, point: &Point, scale: f64, paths: u32) -> Result<[f64; 2], String> {
-    let up = point.normal;
-    let helper = if up.y.abs() < 0.9 { DVec3::Y } else { DVec3::X };
-    let right = helper.cross(up).normalize();
-    let ahead = up.cross(right);
-    let mut sum = [0.0; 2];
-    let faces = [(up, ahead), (right, up), (-right, up), (ahead, up), (-ahead, up)];
-    let samples = (paths / (faces.len() as u32 * POINT_SIZE * POINT_SIZE)).max(1);
-    for (face, (forward, face_up)) in faces.into_iter().enumerate() {
-        reference.look(Camera {
-            name: String::new(),
-            transform: DAffine3::from_cols(
-                forward.cross(face_up),
-                face_up,
-                -forward,
-                point.position + 1e-4 * scale * up,
-            ),
-            projection: Projection::Perspective { fov_y: FRAC_PI_2 },
-        });
-        for _ in 0..samples {
-            reference.render_sample(None).map_err(|e| e.to_string())?;
-        }
-        let estimate = reference.read().map_err(|e| e.to_string())?;
-        for (pixel, (mean, error)) in (0..).zip(estimate.mean.iter().zip(&estimate.standard_error)) {
-            let weight = PI * form_factor(face, [pixel % POINT_SIZE, pixel / POINT_SIZE]);
-            let of_rgb = |rgb: &[f32; 3]| rgb.iter().map(|&v| f64::from(v)).sum::<f64>();
-            sum[0] += weight * of_rgb(mean);
-            sum[1] += (weight * of_rgb(error)).powi(2);
-        }
-    }
-    Ok([sum[0], sum[1].sqrt()])
-}
-
-/// Share of the hemisphere, weighted by the cosine, that a pixel of a face covers, from 16 points of it.
-fn form_factor(face: usize, pixel: [u32; 2]) -> f64 {
-    const PARTS: u32 = 4;
-    let parts = (0..PARTS).flat_map(|y| (0..PARTS).map(move |x| [x, y]));
-    let width = 2.0 / f64::from(PARTS * POINT_SIZE);
-    let of_part = |part: [u32; 2]| {
-        let [x, y] = [0, 1].map(|i| (f64::from(PARTS * pixel[i] + part[i]) + 0.5) * width - 1.0);
-        let cosine = if face == 0 { 1.0 } else { (-y).max(0.0) };
-        cosine * width * width / (PI * (1.0 + x * x + y * y).powi(2))
-    };
-    parts.map(of_part).sum()
-}
-
 /// Of all texels, as gathered.
 fn gathered(gpu: &Gpu, offline: &Offline<'_>) -> Result<Vec<[f32; 4]>, String> {
     let map = offline.renderer.illumination_map().ok_or("no illumination map")?;
@@ -172,6 +123,7 @@ pub(crate) fn errors(gpu: &Gpu, arguments: &Arguments) -> Result<(), String> {
                 settings.set("tracer.kind", "image-space").map_err(|e| e.to_string())?;
             }
             let mut offline = offline(gpu, &scene, &settings)?;
+            offline.stand_still();
             offline.render_frame(None).map_err(|e| e.to_string())?;
             Ok::<_, String>((settings, offline))
         };
@@ -282,14 +234,19 @@ fn all_truths(gpu: &Gpu, arguments: &Arguments, scene: &Scene, points: &[Point])
         ..PathTracerSettings::default()
     };
     let mut reference = Reference::new(gpu, scene.clone(), &paths, 0, [POINT_SIZE; 2]).map_err(|e| e.to_string())?;
-    let bounds = scene.bounds().map_err(|e| e.to_string())?;
-    let scale = (bounds.max - bounds.min).length();
-    let of_point = |point| truth(&mut reference, point, scale, arguments.paths);
-    points.iter().map(of_point).collect()
+    let of_point = |point: &Point| reference.irradiance((point.position, point.normal), arguments.paths);
+    points
+        .iter()
+        .map(of_point)
+        .collect::<Result<_, _>>()
+        .map_err(|e| e.to_string())
 }
 
 /// Median, 95th percentile, share within one percent.
 fn summary(mut errors: Vec<f64>) -> String {
+    if errors.is_empty() {
+        return "no point sees light".to_owned();
+    }
     errors.sort_by(f64::total_cmp);
     let at = |share: f64| 100.0 * errors[((share * errors.len() as f64) as usize).min(errors.len() - 1)];
     let within = errors.iter().filter(|&&e| e <= 0.01).count() as f64 / errors.len() as f64;

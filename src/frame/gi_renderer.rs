@@ -646,7 +646,7 @@ impl GiRenderer {
     }
 
     /// Forgets the illumination map, traces all photons and gathers all texels at once instead of over many frames, unless the
-    /// host's draws gather them ([`GiRenderer::gather_illumination_map`]): at the start, after a cut. Submits what it records and does not wait; call it after `prepare`, before `record_scene`. Nothing
+    /// host's draws gather them ([`GiRenderer::gather_illumination_map_blocking`]): at the start, after a cut. Submits what it records and does not wait; call it after `prepare`, before `record_scene`. Nothing
     /// where there is no such map.
     ///
     /// # Errors

@@ -23,6 +23,8 @@ pub(super) struct HemisphereScene {
     ring: ReadBackRing,
     /// Whether a list of texels is on its way: until it has come, none else are chosen.
     is_under_way: bool,
+    /// Whether what comes back next is of texels that are no more.
+    is_stale: bool,
     /// Texels to gather in the next frame that is recorded.
     texels: Vec<ChosenTexel>,
 }
@@ -61,12 +63,14 @@ impl HemisphereScene {
             returned: gpu::buffer(device, "lightfall::HemisphereScene::returned", bytes, usage)?,
             ring: ReadBackRing::new(device, "lightfall::HemisphereScene::ring", bytes)?,
             is_under_way: false,
+            is_stale: false,
             texels: Vec::new(),
         })
     }
 
     /// Forgets what was to be gathered: texels are other ones.
     pub(super) fn restart(&mut self) {
+        self.is_stale = self.is_under_way;
         self.texels.clear();
     }
 
@@ -77,12 +81,14 @@ impl HemisphereScene {
         frame: &UnitFrame,
         places: &[SurfacePlace],
     ) -> Result<Vec<CaptureView>, Error> {
+        let is_lost = self.ring.take_lost();
         let arrived = self.ring.take_words();
-        if arrived.is_some() || self.ring.take_lost() {
+        if is_lost || arrived.is_some() {
             self.is_under_way = false;
-        }
-        if let Some(words) = arrived {
-            self.texels = chosen(&words, self.hemispheres.capacity());
+            let is_stale = std::mem::take(&mut self.is_stale);
+            if let Some(words) = arrived.filter(|_| !is_stale) {
+                self.texels = chosen(&words, self.hemispheres.capacity());
+            }
         }
         self.texels.retain(|t| t.index as usize / 2 < places.len());
         self.texels.truncate(self.hemispheres.capacity() as usize);
@@ -129,8 +135,10 @@ impl HemisphereScene {
         inputs: &DrawInputs<'_>,
         (lights, map): (&SurfaceLights, &IlluminationMap),
     ) -> Result<(), Error> {
+        // Texels that are drawn now were due when texels were chosen in this frame.
+        let draws = !self.texels.is_empty();
         self.record_draws(encoder, inputs, (lights, map))?;
-        if !self.is_under_way {
+        if !draws && !self.is_under_way {
             let list = map.chosen().buffer();
             encoder.copy_buffer_to_buffer(list, 0, &self.returned, 0, list.size());
             encoder.copy_buffer_to_buffer(map.shifts(), 0, &self.returned, list.size(), map.shifts().size());
@@ -150,9 +158,8 @@ impl HemisphereScene {
         let Some(pass) = &inputs.passes.hemisphere_gather else {
             return Ok(());
         };
-        let wanted = self.texels.len() * self.hemispheres.shape().views() as usize;
         // Recorded twice after one `prepare`: the first has gathered them.
-        if inputs.views.len() != wanted {
+        if self.texels.is_empty() {
             return Ok(());
         }
         let gather_inputs = HemisphereGatherInputs {

@@ -45,7 +45,7 @@ impl IlluminationScene {
             a_frame.saturating_mul(own.gather.rays)
         };
         let mut gather = TexelGatherResources::new(device)?;
-        if own.gather.guided > 0.0 {
+        if shape.is_none() && own.gather.guided > 0.0 {
             gather.guide_rays(device, a_frame)?;
         }
         Ok(Self {

@@ -168,7 +168,7 @@ pub struct IlluminationMapSettings {
     pub texels: u32,
     /// How and when they are gathered.
     pub gather: TexelGatherSettings,
-    /// By what: draws begin some frames after a change, for which texels these are for comes back from the GPU, and want fewer
+    /// By what. What a host keeps out of environment maps is not drawn. Draws begin some frames after a change, for which texels these are for comes back from the GPU, and want fewer
     /// texels a frame.
     pub method: TexelGatherMethod,
     /// Pixels that draws are wide, even, 2 to 128.
@@ -1020,7 +1020,7 @@ const KNOBS: &[Knob] = &[
         |v: f32| v > 0.0 && v <= 1.0
     ),
     choice!(
-        "illumination_maps.gather",
+        "illumination_maps.method",
         "rays, plane or cube",
         illumination_maps.method,
         ["rays", TexelGatherMethod::Rays],
@@ -1041,9 +1041,9 @@ const KNOBS: &[Knob] = &[
     ),
     field!(
         "illumination_maps.guided",
-        "0 to below 1: share of the rays",
+        "0 to 0.95: share of the rays",
         illumination_maps.gather.guided,
-        |v: f32| (0.0..1.0).contains(&v)
+        |v: f32| (0.0..=0.95).contains(&v)
     ),
     field!(
         "illumination_maps.least_photons",

@@ -10,8 +10,9 @@
 //! are few, those of the texels around count as well.
 //!
 //! Order, for each frame: [`TexelGather::record_rays`], the tracer's `record_surface_rays`, [`TexelGather::record`]. Where
-//! [`HemisphereGather`](super::HemisphereGather) gathers instead, it goes between the two, without rays. Cost: texels × rays,
-//! whether anything is due or not; rays of none are over at once.
+//! [`HemisphereGather`](super::HemisphereGather) gathers instead, it goes between the two, without rays. Cost: texels × rays
+//! of the budget, whether as many are due or not, for rays of none are over at once; texels, more where light is taken from
+//! photons around; impacts in the pool, while rays are guided.
 
 use super::dispatch_64;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot, Step};
@@ -146,7 +147,7 @@ pub struct TexelGatherSettings {
     /// Photons that all light at a texel is taken from, if as many lie around it on its surface: of texels with fewer, more of
     /// the surface is taken. 0: none but its own. More are smoother and blurrier.
     pub least_photons: u32,
-    /// Share of the rays that go where photons came from which had been scattered before, 0 to below 1, where there are many of
+    /// Share of the rays that go where photons came from which had been scattered before, 0 to 0.95, where there are many of
     /// these, half of it where there are 128; the others are spread as the cosine.
     pub guided: f32,
 }

@@ -161,6 +161,20 @@ impl Hemispheres {
             return Err(invalid("Hemispheres::size", size, "even, from 2"));
         }
         let capacity = capacity.max(1);
+        let limits = device.limits();
+        for (what, needed, limit) in [
+            ("hemispheres", capacity, limits.max_compute_workgroups_per_dimension),
+            ("pixels of a hemisphere", size, limits.max_texture_dimension_2d),
+        ] {
+            if needed > limit {
+                return Err(Error::LimitExceeded {
+                    what: format!("{needed} {what}"),
+                    needed: u64::from(needed),
+                    limit: u64::from(limit),
+                    remedy: "gather fewer texels at once, or with fewer pixels",
+                });
+            }
+        }
         let height = size / 2 * shape.half_heights();
         // About as high as wide.
         let columns = (f64::from(capacity) * f64::from(height) / f64::from(size))
@@ -169,7 +183,10 @@ impl Hemispheres {
         let columns = columns.clamp(1, capacity);
         let texture = |label, format, usage| device::TextureSpec {
             label,
-            size: [columns * size, capacity.div_ceil(columns) * height],
+            size: [
+                columns.saturating_mul(size),
+                capacity.div_ceil(columns).saturating_mul(height),
+            ],
             layers: 1,
             format,
             usage,
@@ -183,6 +200,7 @@ impl Hemispheres {
         let depth_format = CaptureTargets::of(CapturePurpose::Hemisphere).depth;
         let depth = texture("lightfall::Hemispheres::depth", depth_format, T::RENDER_ATTACHMENT);
         let view = |spec| Ok::<_, Error>(device::texture(device, spec)?.create_view(&Default::default()));
+        let (image_view, depth_view) = (view(&image)?, view(&depth)?);
         let weights: Vec<f32> = shape
             .form_factors(size)
             .iter()
@@ -197,8 +215,8 @@ impl Hemispheres {
             columns,
             capacity,
             texture_bytes: image.bytes() + depth.bytes(),
-            image: view(&image)?,
-            depth: view(&depth)?,
+            image: image_view,
+            depth: depth_view,
             weights: device::buffer(device, "lightfall::Hemispheres::weights", weight_bytes, usage)?,
             records: device::buffer(device, "lightfall::Hemispheres::records", record_bytes, usage)?,
             places: Vec::new(),

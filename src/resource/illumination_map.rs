@@ -92,7 +92,7 @@ impl IlluminationMap {
         &self.radiosity
     }
 
-    /// Of each of the texels that are gathered in a frame how far it stands from its place: four `f32`, unit frame, the last 0.
+    /// Of each of the texels that are chosen in a frame how far it stands from its place: four `f32`, unit frame, the last 0.
     pub fn shifts(&self) -> &wgpu::Buffer {
         &self.shifts
     }
@@ -107,12 +107,13 @@ impl IlluminationMap {
         &self.due
     }
 
-    /// Two `u32` of the last frame: texels gathered, and those that wait.
+    /// Two `u32` of the last frame: texels chosen to be gathered, and those that wait. Where draws gather, those chosen are
+    /// gathered some frames later, or chosen again.
     pub fn counts(&self) -> &wgpu::Buffer {
         &self.counts
     }
 
-    /// The texels that are gathered in a frame.
+    /// The texels that are chosen in a frame.
     pub fn chosen(&self) -> &PathList {
         &self.chosen
     }

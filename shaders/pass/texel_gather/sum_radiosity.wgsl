@@ -11,7 +11,7 @@
 
 // How far it is looked for photons, in cells, at first, at most, and by how much further each time.
 const FIRST_REACH: f32 = 1.0;
-const MOST_REACH: f32 = 4.0;
+const MOST_REACH: f32 = 3.5;
 const NEXT_REACH: f32 = 1.5;
 // Cosine of the largest angle between the normals of a texel and of one that counts for it.
 const SAME_WAY: f32 = 0.5;
