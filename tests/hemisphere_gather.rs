@@ -312,14 +312,14 @@ fn a_cube_gathers_what_paths_bring() {
     let error = |texel: usize| {
         let [x, y, z, _, nx, ny, nz, _] = records[texel];
         let normal = Vec3::new(nx, ny, nz).as_dvec3();
-        let truth = reference.irradiance((frame.world_point(Vec3::new(x, y, z)), normal), 100_000);
+        let truth = reference.irradiance((frame.world_point(Vec3::new(x, y, z)), normal), 40_000);
         let own: f64 = light[texel][..3].iter().map(|&v| f64::from(v) * scale).sum();
         (own / truth.unwrap()[0] - 1.0).abs()
     };
     let mut errors: Vec<f64> = open.step_by(97).map(error).collect();
     errors.sort_by(f64::total_cmp);
     println!("{} texels: {errors:.4?}", errors.len());
-    assert!(errors.len() >= 15 && errors[errors.len() / 2] < 0.01 && errors[errors.len() * 9 / 10] < 0.05);
+    assert!(errors.len() >= 15 && errors[errors.len() / 2] < 0.02 && errors[errors.len() * 9 / 10] < 0.05);
     assert_no_errors(&gpu);
 }
 
