@@ -116,7 +116,7 @@ impl HemisphereScene {
         // Two texels a place, the first on the side that its normal points to.
         let of_texel = |texel: &ChosenTexel| {
             let place = &places[texel.index as usize / 2];
-            let side = if texel.index % 2 == 0 { 1.0 } else { -1.0 };
+            let side = if texel.index.is_multiple_of(2) { 1.0 } else { -1.0 };
             HemispherePlace {
                 position: frame.point(place.position) + texel.shift,
                 normal: (side * place.normal).as_vec3(),
