@@ -1,5 +1,5 @@
-//! Beside the layers, for any of them: trees over boxes, binary ones built by the surface-area heuristic, collapsed by `obvhs` into compressed nodes of eight
-//! children (Ylitie et al. 2017).
+//! Beside the layers, for any of them: trees over boxes, binary ones built by the surface-area heuristic, collapsed by `obvhs`
+//! into compressed nodes of eight children (Ylitie et al. 2017).
 //!
 //! The binary tree is built here, from the top down (Wald 2007, "On fast construction of SAH-based bounding volume
 //! hierarchies"), and not by `obvhs`: its clustering from the bottom up takes quadratic time and as many levels as boxes

@@ -134,8 +134,8 @@ fn all_around_the_same_light_is_gathered_whole() {
     assert_no_errors(&gpu);
 }
 
-/// Form factor from a point on the floor to an upright rectangle at distance d, of height h, which reaches w to each side of the
-/// foot.
+/// Form factor from a point on the floor to an upright rectangle at distance d, of height h, which reaches w to each side of
+/// the foot.
 fn of_wall(d: f64, h: f64, w: f64) -> f64 {
     let slant = d.hypot(h);
     ((w / d).atan() - d / slant * (w / slant).atan()) / PI

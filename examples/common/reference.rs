@@ -65,8 +65,8 @@ impl<'a> Reference<'a> {
     }
 
     /// Irradiance that surfaces around a point send to it, world units, the sum of its channels, and its standard error. The
-    /// point looks around, above and, by the upper halves of four square pictures, to its sides, so that the directions of paths
-    /// are spread evenly. The reference's component is `All`: nothing may shine that can be seen.
+    /// point looks around, above and, by the upper halves of four square pictures, to its sides, so that the directions of
+    /// paths are spread evenly. The reference's component is `All`: nothing may shine that can be seen.
     pub(crate) fn irradiance(&mut self, (position, normal): (DVec3, DVec3), paths: u32) -> Result<[f64; 2], Error> {
         let helper = if normal.y.abs() < 0.9 { DVec3::Y } else { DVec3::X };
         let right = helper.cross(normal).normalize();
@@ -154,8 +154,8 @@ impl<'a> Reference<'a> {
     }
 }
 
-/// Share of the hemisphere, weighted by the cosine, that a pixel of the face above, or of one to the side, covers: from 16 points
-/// of it.
+/// Share of the hemisphere, weighted by the cosine, that a pixel of the face above, or of one to the side, covers: from 16
+/// points of it.
 fn form_factor(is_above: bool, pixel: [u32; 2], size: u32) -> f64 {
     const PARTS: u32 = 4;
     let parts = (0..PARTS).flat_map(|y| (0..PARTS).map(move |x| [x, y]));

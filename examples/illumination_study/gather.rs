@@ -1,7 +1,7 @@
 //! How far off the irradiance of a texel is, by what gathers it, and how long it takes.
 //!
-//! The truth is path traced: paths that end at a texel, seen from just above it. All ways gather from the same light, of so many
-//! photons at so many places. Times are of all texels at once, less a frame without, a texel.
+//! The truth is path traced: paths that end at a texel, seen from just above it. All ways gather from the same light, of so
+//! many photons at so many places. Times are of all texels at once, less a frame without, a texel.
 
 use crate::Arguments;
 use crate::common::adapter::Gpu;

@@ -1,6 +1,6 @@
 // The light that an impact belongs to: the nearest one with an area that faces the same way, by a distance that counts off the
-// impact's plane more than along it. The module brings `lights`, `grid` and `cells`: of each cell the first of its entries, and one
-// more; behind them the entries, indices of lights.
+// impact's plane more than along it. The module brings `lights`, `grid` and `cells`: of each cell the first of its entries, and
+// one more; behind them the entries, indices of lights.
 
 const NO_LIGHT: u32 = 0xffffffffu;
 // Cosine of the largest angle between the normals of an impact and of its light, if there is a light within it.

@@ -646,8 +646,8 @@ impl GiRenderer {
     }
 
     /// Forgets the illumination map, traces all photons and gathers all texels at once instead of over many frames, unless the
-    /// host's draws gather them ([`GiRenderer::gather_illumination_map_blocking`]): at the start, after a cut. Submits what it records and does not wait; call it after `prepare`, before `record_scene`. Nothing
-    /// where there is no such map.
+    /// host's draws gather them ([`GiRenderer::gather_illumination_map_blocking`]): at the start, after a cut. Submits what it
+    /// records and does not wait; call it after `prepare`, before `record_scene`. Nothing where there is no such map.
     ///
     /// # Errors
     /// As [`GiRenderer::record_scene`].
@@ -669,9 +669,9 @@ impl GiRenderer {
         self.submit_rounds(rounds, inputs)
     }
 
-    /// Gathers all texels of the illumination map at once by the host's draws, where these gather, from the light of the last frame
-    /// that was recorded or filled ([`GiRenderer::fill_illumination_map`]): at the start, after a cut. Submits and waits, for
-    /// texels stand where photons arrived. It prepares the geometry for views of its own: call `prepare` again before
+    /// Gathers all texels of the illumination map at once by the host's draws, where these gather, from the light of the last
+    /// frame that was recorded or filled ([`GiRenderer::fill_illumination_map`]): at the start, after a cut. Submits and waits,
+    /// for texels stand where photons arrived. It prepares the geometry for views of its own: call `prepare` again before
     /// `record_scene`.
     ///
     /// # Errors

@@ -95,7 +95,8 @@ impl HemisphereScene {
         self.stand(queue, frame, places)
     }
 
-    /// The views of texels from one on, at most [`HemisphereScene::capacity`], which stand so far from their places, unit frame.
+    /// The views of texels from one on, at most [`HemisphereScene::capacity`], which stand so far from their places, unit
+    /// frame.
     pub(super) fn plan_texels(
         &mut self,
         queue: &wgpu::Queue,
@@ -187,7 +188,8 @@ impl HemisphereScene {
     }
 }
 
-/// What has come back: workgroups of a dispatch, how many texels there are, they, as many as there is room for, and their shifts.
+/// What has come back: workgroups of a dispatch, how many texels there are, they, as many as there is room for, and their
+/// shifts.
 fn chosen(words: &[u32], room: u32) -> Vec<ChosenTexel> {
     const HEADER: usize = 4;
     let count = words.get(HEADER - 1).copied().unwrap_or(0).min(room) as usize;

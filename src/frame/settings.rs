@@ -168,8 +168,8 @@ pub struct IlluminationMapSettings {
     pub texels: u32,
     /// How and when they are gathered.
     pub gather: TexelGatherSettings,
-    /// By what. What a host keeps out of environment maps is not drawn. Draws begin some frames after a change, for which texels these are for comes back from the GPU, and want fewer
-    /// texels a frame.
+    /// By what. What a host keeps out of environment maps is not drawn. Draws begin some frames after a change, for which
+    /// texels these are for comes back from the GPU, and want fewer texels a frame.
     pub method: TexelGatherMethod,
     /// Pixels that draws are wide, even, 2 to 128.
     pub hemisphere_size: u32,

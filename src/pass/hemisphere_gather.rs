@@ -1,11 +1,11 @@
 //! Indirect light at texels of surfaces, gathered by the host's draws: neither triangles nor environment maps are needed.
 //!
 //! Inputs: [`Hemispheres`], the host's [`Geometry`], [`SurfaceLights`], [`IlluminationMap`]. Output: the irradiance of these
-//! texels in the map, and that they are not due. The scene is drawn as a point of a surface sees it, onto a plane or half a cube,
-//! many points in one render pass; the light of what a pixel shows is that of the texel nearest to it,
-//! [`IlluminationMap::radiosity`], so that the host draws surfaces and knows nothing of light. E = Σ B F / Σ F with the exact form
-//! factor F of each pixel. Source: Larsen 2004, chapter 11, with changes: form factors of pixels are integrals, the sum is taken
-//! in `f32`, and by π more.
+//! texels in the map, and that they are not due. The scene is drawn as a point of a surface sees it, onto a plane or half a
+//! cube, many points in one render pass; the light of what a pixel shows is that of the texel nearest to it,
+//! [`IlluminationMap::radiosity`], so that the host draws surfaces and knows nothing of light. E = Σ B F / Σ F with the exact
+//! form factor F of each pixel. Source: Larsen 2004, chapter 11, with changes: form factors of pixels are integrals, the sum is
+//! taken in `f32`, and by π more.
 //!
 //! Order: [`TexelGather::record_rays`](super::TexelGather::record_rays), [`HemisphereGather::record`],
 //! [`TexelGather::record`](super::TexelGather::record). Cost: points × draws of the scene (1 or 5 each, what the host does not

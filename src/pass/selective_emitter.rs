@@ -11,8 +11,8 @@
 //! ones elsewhere; [`SelectiveEmitter::record_choice`]; the same of [`PhotonGroups::chosen`]. Cost: a path for each group, and
 //! what has changed. A change that only some of a group's paths meet is found after as many frames as the group has paths,
 //! times the interval, at the latest; where more changes than the budget allows, what waits gains on what changes again.
-//! Limits: lights that take another number of photons have all photons traced anew; with [`Lights::keep_division`] that is where
-//! one grows brighter or dimmer by much.
+//! Limits: lights that take another number of photons have all photons traced anew; with [`Lights::keep_division`] that is
+//! where one grows brighter or dimmer by much.
 
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, Slot, Step};
 use crate::resource::photon_groups::LightsChange;

@@ -121,8 +121,8 @@ pub(crate) const CHANGE_SHIFT: u32 = 4;
 /// Workgroups of a dispatch along an axis: one a texel.
 const MOST_A_FRAME: u32 = 65_535;
 
-/// Of a texel's hemisphere, where photons come from: `INCIDENT_STRIDE` in `shaders/pass/texel_gather/incident_cell.wgsl`, 4 bytes
-/// each.
+/// Of a texel's hemisphere, where photons come from: `INCIDENT_STRIDE` in `shaders/pass/texel_gather/incident_cell.wgsl`, 4
+/// bytes each.
 const INCIDENT_BYTES: u64 = 4 * 65;
 
 /// Rays that go wherever light may come from, at least: what no photon showed has a weight of its inverse.

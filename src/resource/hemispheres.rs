@@ -31,8 +31,8 @@ pub(crate) mod gpu {
 /// What the hemisphere over a point is drawn onto.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum GatherShape {
-    /// A square at distance 1 that reaches so far to each side, above 0. It covers 55.4 %, 83.1 % and 91.7 % of the cosine-weighted
-    /// hemisphere at 1, 2 and 3; what is seen there stands for the rest. One view a point.
+    /// A square at distance 1 that reaches so far to each side, above 0. It covers 55.4 %, 83.1 % and 91.7 % of the
+    /// cosine-weighted hemisphere at 1, 2 and 3; what is seen there stands for the rest. One view a point.
     Plane {
         /// Half its side, in distances from the point.
         half_side: f32,
@@ -122,8 +122,8 @@ pub struct HemispherePlace {
     pub texel: u32,
 }
 
-/// Tiles of surface texels, `rgba32uint` as in [`EnvMaps`](super::EnvMaps), with distances from the eye of a tile: what points of
-/// surfaces see. A tile is as wide as it is set to be; on top what lies above the point, and below it, of a cube, the upper
+/// Tiles of surface texels, `rgba32uint` as in [`EnvMaps`](super::EnvMaps), with distances from the eye of a tile: what points
+/// of surfaces see. A tile is as wide as it is set to be; on top what lies above the point, and below it, of a cube, the upper
 /// halves of its four sides. All tiles lie in one image, so that all of them are drawn in one render pass. The eye is 2^-12
 /// above its surface.
 #[derive(Debug)]
@@ -144,8 +144,8 @@ impl Hemispheres {
     /// Room for `capacity` points at once, each of `size` pixels in width: even, from 2.
     ///
     /// # Errors
-    /// [`Error::InvalidSetting`] for a plane that is not larger than nothing, or a size that is odd; [`Error::LimitExceeded`] if
-    /// the tiles do not fit a texture.
+    /// [`Error::InvalidSetting`] for a plane that is not larger than nothing, or a size that is odd; [`Error::LimitExceeded`]
+    /// if the tiles do not fit a texture.
     pub fn new(
         device: &wgpu::Device,
         queue: &wgpu::Queue,

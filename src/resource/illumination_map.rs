@@ -86,8 +86,8 @@ impl IlluminationMap {
         &self.gathered
     }
 
-    /// All light that leaves the surface at each texel, per area, RGB in the unit frame: π times its radiance. Alpha: the photons
-    /// that it is taken from. Four `f32`. Of the present frame.
+    /// All light that leaves the surface at each texel, per area, RGB in the unit frame: π times its radiance. Alpha: the
+    /// photons that it is taken from. Four `f32`. Of the present frame.
     pub fn radiosity(&self) -> &wgpu::Buffer {
         &self.radiosity
     }

@@ -47,8 +47,8 @@ pub enum SurfaceHitKind {
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct SurfaceHit {
-    /// From where the ray starts, unit frame: 2^-12 above its position through maps, some units in the last place above it among
-    /// triangles. 0 if it meets nothing.
+    /// From where the ray starts, unit frame: 2^-12 above its position through maps, some units in the last place above it
+    /// among triangles. 0 if it meets nothing.
     pub distance: f32,
     /// A [`SurfaceHitKind`] as a number, from 1 in the order Surface, Escaped, Lost, Tentative.
     pub kind: u32,

@@ -64,11 +64,11 @@ impl SurfacePoint {
         Self::place_where(scene, count, |_, _| [true; 2])
     }
 
-    /// The same for a scene whose parts stay where they are: surface that is hidden where these stand in one another has no area,
-    /// so that a texel or a light holds what falls on the open surface around it alone. A side of a place is hidden where three
-    /// of four rays from there meet the backs of triangles: of solids, that is, whose fronts face outward. Where what hides a
-    /// place moves away, or is a single sheet, use [`SurfacePoint::place`], which takes all surface for open. Takes as long
-    /// again, and two thousand rays a point that the processor follows.
+    /// The same for a scene whose parts stay where they are: surface that is hidden where these stand in one another has no
+    /// area, so that a texel or a light holds what falls on the open surface around it alone. A side of a place is hidden where
+    /// three of four rays from there meet the backs of triangles: of solids, that is, whose fronts face outward. Where what
+    /// hides a place moves away, or is a single sheet, use [`SurfacePoint::place`], which takes all surface for open. Takes as
+    /// long again, and two thousand rays a point that the processor follows.
     #[cfg(feature = "bvh")]
     pub fn place_in_still_scene(scene: &Scene, count: usize) -> Vec<Self> {
         let surface = super::open_surface::OpenSurface::new(scene);
@@ -290,8 +290,8 @@ impl Cells {
         Self { side, points }
     }
 
-    /// The point, and its side, that is nearest to a side of a place and faces the same way, of those that are kept; distances off
-    /// the place's plane counted as surface lights do. Where none does, the nearest that faces least apart.
+    /// The point, and its side, that is nearest to a side of a place and faces the same way, of those that are kept; distances
+    /// off the place's plane counted as surface lights do. Where none does, the nearest that faces least apart.
     fn nearest(&self, placed: &[Placed], kept: &[[bool; 2]], (own, side): (&SurfacePlace, usize)) -> (usize, usize) {
         let cost = |point: usize| {
             let away = placed[point].place.position - own.position;
