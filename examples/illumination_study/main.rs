@@ -51,7 +51,7 @@ struct Arguments {
     #[arg(long, default_value = "")]
     ways: String,
     /// Photons of `gather`
-    #[arg(long, default_value_t = 2_000_000)]
+    #[arg(long, default_value_t = 1_300_000)]
     photons: u32,
     /// Part of the adapter's name or backend
     #[arg(long)]
