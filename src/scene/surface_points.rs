@@ -247,11 +247,15 @@ fn cell_areas(
     }
     let is_kept = |(all, open): (&[f64; 2], &[f64; 2])| [0, 1].map(|s| open[s] >= LEAST_OPEN * all[s]);
     let kept: Vec<_> = all.iter().zip(&open).map(is_kept).collect();
-    let mut areas = vec![[0.0; 2]; placed.len()];
-    for sample in &samples {
-        for side in [0, 1] {
-            let (point, own) = cells.nearest(placed, &kept, (&sample.place, side));
-            areas[point][own] += sample.areas[side];
+    // Where all are, samples belong to the same points again.
+    let mut areas = open;
+    if kept.iter().flatten().any(|is_kept| !is_kept) {
+        areas.fill([0.0; 2]);
+        for sample in &samples {
+            for side in [0, 1] {
+                let (point, own) = cells.nearest(placed, &kept, (&sample.place, side));
+                areas[point][own] += sample.areas[side];
+            }
         }
     }
     // A point between others has a little, not nothing, unless it is hidden.
