@@ -374,6 +374,39 @@ fn draws_follow_without_triangles() {
 
 #[test]
 #[cfg(feature = "bvh")]
+fn what_changed_once_is_drawn_once() {
+    let Some(gpu) = gpu() else { return };
+    let settings = settings(&[("tracer.kind", "bvh"), ("illumination_maps.threshold", "0")]);
+    let mut scene = rooms(1.0);
+    let mut offline = offline(&gpu, &scene, &settings);
+    bulb(&mut scene, 1).x += 1.2;
+    offline.set_scene(scene).unwrap();
+    let mut draws = vec![0; texels(&gpu, &offline).len()];
+    let (mut frames, mut most, mut were_due) = (0, 0, 0);
+    while frames < 50 || waiting(&gpu, &offline) > 0 {
+        // What is gathered is written over it.
+        let unwritten = vec![[-1.0_f32; 4]; draws.len()];
+        let map = offline.renderer.illumination_map().unwrap();
+        gpu.queue.write_buffer(map.gathered(), 0, bytemuck::cast_slice(&unwritten));
+        offline.render_frame(None).unwrap();
+        were_due = were_due.max(waiting(&gpu, &offline));
+        let light = texels(&gpu, &offline);
+        let is_drawn = |texel: usize| light[texel] != unwritten[texel];
+        let drawn: Vec<usize> = (0..draws.len()).filter(|&t| is_drawn(t)).collect();
+        drawn.iter().for_each(|&t| draws[t] += 1);
+        most = most.max(drawn.len());
+        frames += 1;
+        assert!(frames < 200, "it comes to rest");
+    }
+    let of = |count: i32| draws.iter().filter(|&&d| d == count).count();
+    println!("{were_due} due, drawn once {}, never {}, at most {most} a frame", of(1), of(0));
+    assert!(of(1) == were_due && of(0) + of(1) == draws.len());
+    assert!(were_due > 200 && most == 60);
+    assert_no_errors(&gpu);
+}
+
+#[test]
+#[cfg(feature = "bvh")]
 fn behind_a_closed_door_no_texel_is_drawn() {
     let Some(gpu) = gpu() else { return };
     let mut scene = rooms(0.0);

@@ -130,6 +130,27 @@ fn mean_over_disc(radius: f64, value: impl Fn(DVec3) -> f64) -> f64 {
 }
 
 #[test]
+fn paths_through_the_middle_of_a_pixel_see_that_point_alone() {
+    let Some(gpu) = gpu() else { return };
+    let (albedo, half_view, lamp) = (0.6, 0.8, DVec3::new(0.3, 1.0, -0.2));
+    let mut scene = floor(1.0, albedo as f32, half_view);
+    scene.lights.push(Light::point(lamp, 3.0, [1.0; 3]));
+    let settings = PathTracerSettings {
+        spans_pixel: false,
+        ..unlimited()
+    };
+    let size = 8;
+    let estimate = render(&gpu, &scene, &settings, [size; 2], 4);
+    for (pixel, (mean, error)) in (0..).zip(estimate.mean.iter().zip(&estimate.standard_error)) {
+        let at = |i: u32| half_view * (2.0 * (f64::from(i) + 0.5) / f64::from(size) - 1.0);
+        let point = DVec3::new(at(pixel % size), 0.0, at(pixel / size));
+        let exact = albedo / PI * 3.0 * cosine_over_square(lamp, point);
+        let off = f64::from(mean[0]) / exact - 1.0;
+        assert!(off.abs() < 1e-5 && error[0] == 0.0, "pixel {pixel}: {mean:?}, {exact}");
+    }
+}
+
+#[test]
 fn a_plane_is_lit_by_each_kind_of_light_as_the_formula_says() {
     let Some(gpu) = gpu() else { return };
     let (albedo, half_view) = (0.6, 0.8);

@@ -151,6 +151,8 @@ pub(crate) fn errors(gpu: &Gpu, arguments: &Arguments) -> Result<(), String> {
                 (own / truth[0] - 1.0).abs()
             };
             *row += &format!(" {} |", summary(points.iter().zip(&truths).map(error).collect()));
+            // Frees what the way held.
+            offline::wait(&gpu.device).map_err(|e| e.to_string())?;
         }
     }
     println!("{head}\n|{}", "---|".repeat(arguments.samples.len() + 1));

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --release --example illumination_study -- --parts cost --plot docs/illumination_cost.svg
-//! cargo run --release --example illumination_study -- --parts gather,triangles,texels
+//! cargo run --release --example illumination_study -- --parts gather,triangles,texels,moving
 //! ```
 
 #[path = "../common/mod.rs"]
@@ -10,6 +10,8 @@ mod common;
 
 mod cost;
 mod gather;
+mod moving;
+mod picture;
 mod texels;
 
 use clap::Parser;
@@ -21,7 +23,7 @@ use std::path::PathBuf;
 #[derive(Parser)]
 struct Arguments {
     /// Which tables
-    #[arg(long, value_delimiter = ',', default_values = ["cost", "gather", "triangles", "texels"])]
+    #[arg(long, value_delimiter = ',', default_values = ["cost", "gather", "triangles", "texels", "moving"])]
     parts: Vec<String>,
     /// Width and height in pixels
     #[arg(long, default_value_t = 128)]
@@ -47,7 +49,7 @@ struct Arguments {
     /// Times that light is scattered before it is gathered: the truth of more is noisier
     #[arg(long, default_value_t = 1)]
     bounces: u32,
-    /// Ways of `gather` and `triangles`: those whose names contain this
+    /// Ways of `gather`, `triangles` and `moving`: those whose names contain this
     #[arg(long, default_value = "")]
     ways: String,
     /// Photons of `gather`
@@ -80,7 +82,8 @@ fn run(arguments: &Arguments) -> Result<(), String> {
             "gather" => gather::errors(&gpu, arguments)?,
             "triangles" => gather::times(&gpu, arguments)?,
             "texels" => texels::table(&gpu, arguments)?,
-            other => return Err(format!("{other} is no part: cost, gather, triangles, texels")),
+            "moving" => moving::table(&gpu, arguments)?,
+            other => return Err(format!("{other} is no part: cost, gather, triangles, texels, moving")),
         }
     }
     gpu.check()

@@ -7,10 +7,10 @@ use crate::Arguments;
 use crate::common::adapter::Gpu;
 use crate::common::clock::median;
 use crate::common::offline::{self, Component, Offline};
-use crate::common::reference::Reference;
+use crate::picture::{SIZE, errors, truth};
 use lightfall::frame::{IndirectMethod, Settings};
 use lightfall::glam::Vec3;
-use lightfall::reference::{PathComponent, PathEstimate, PathTracerSettings};
+use lightfall::reference::PathEstimate;
 use lightfall::scene::{Scene, SurfacePoint, samples};
 use std::time::Instant;
 
@@ -19,14 +19,10 @@ const ALONG: [u32; 5] = [5, 10, 20, 30, 50];
 
 const BOUNCES: u32 = 2;
 
-/// Pixels along an axis, and paths of each that the truth is the mean of.
-const SIZE: u32 = 64;
-const SAMPLES: u32 = 1024;
-
 /// Prints the table.
 pub(crate) fn table(gpu: &Gpu, _: &Arguments) -> Result<(), String> {
     let scene = samples::cornell(0.3);
-    let truth = truth(gpu, &scene)?;
+    let truth = truth(gpu, &scene, BOUNCES)?;
     println!("{SIZE} × {SIZE} pixels, {BOUNCES} bounces\n");
     println!("| along the floor | places | photons | relMSE | bias | kinks | ms to gather all | ms a frame |");
     println!("|---|---|---|---|---|---|---|---|");
@@ -37,19 +33,6 @@ pub(crate) fn table(gpu: &Gpu, _: &Arguments) -> Result<(), String> {
         }
     }
     Ok(())
-}
-
-fn truth(gpu: &Gpu, scene: &Scene) -> Result<PathEstimate, String> {
-    let paths = PathTracerSettings {
-        component: PathComponent::Indirect,
-        bounces: BOUNCES,
-        ..PathTracerSettings::default()
-    };
-    let mut reference = Reference::new(gpu, scene.clone(), &paths, 0, [SIZE; 2]).map_err(|e| e.to_string())?;
-    for _ in 0..SAMPLES {
-        reference.render_sample(None).map_err(|e| e.to_string())?;
-    }
-    reference.read().map_err(|e| e.to_string())
 }
 
 /// A texel in the middle of each cell of the faces of a scene, all of which are quadrilaterals.
@@ -124,7 +107,7 @@ fn measure(
     let with = time(&mut offline, true)?;
     let without = time(&mut offline, false)?;
     let own = offline.read().map_err(|e| e.to_string())?;
-    let [relative, bias] = error(&own, truth);
+    let [relative, bias] = errors(&own, truth)?;
     Ok(format!(
         "| {along} | {} | {photons}{} | {relative:.4} | {:+.1} % | {:.3} | {:.0} | {without:.0} |",
         offline.points.len(),
@@ -137,21 +120,6 @@ fn measure(
         kinks(&own),
         with - without,
     ))
-}
-
-/// Relative mean square error, less what the truth's noise adds, and bias.
-fn error(own: &[[f32; 3]], truth: &PathEstimate) -> [f64; 2] {
-    let mean =
-        |image: &[[f32; 3]]| image.iter().flatten().map(|&v| f64::from(v)).sum::<f64>() / (3 * image.len()) as f64;
-    let level = mean(&truth.mean);
-    let mut sum = 0.0;
-    for ((own, truth), error) in own.iter().zip(&truth.mean).zip(&truth.standard_error) {
-        for c in 0..3 {
-            let (o, t, e) = (f64::from(own[c]), f64::from(truth[c]), f64::from(error[c]));
-            sum += ((o - t).powi(2) - e * e) / (t * t + (0.01 * level).powi(2));
-        }
-    }
-    [sum / (3 * own.len()) as f64, mean(own) / level - 1.0]
 }
 
 /// Median of how far a pixel is from the middle of those to its left and right, over its light, where it is not an edge.

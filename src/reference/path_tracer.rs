@@ -40,7 +40,8 @@ pub(crate) mod gpu {
         pub(crate) environment_norm: f32,
         pub(crate) environment_rotation: f32,
         pub(crate) environment_size: [u32; 2],
-        pub(crate) _pad: [u32; 2],
+        pub(crate) spans_pixel: u32,
+        pub(crate) _pad: u32,
     }
 
     /// Twin of `Params` in `shaders/reference/path_tracer/resolve.wgsl`.
@@ -84,6 +85,8 @@ pub struct PathTracerSettings {
     pub bounces: u32,
     /// Scatterings before Russian roulette may end a path. Fewer are faster and noisier.
     pub roulette_from: u32,
+    /// Whether paths begin all over a pixel, as a box filter does; else all go through its middle, which is what passes see of it.
+    pub spans_pixel: bool,
 }
 
 impl Default for PathTracerSettings {
@@ -92,6 +95,7 @@ impl Default for PathTracerSettings {
             component: PathComponent::All,
             bounces: 64,
             roulette_from: 4,
+            spans_pixel: true,
         }
     }
 }
@@ -387,6 +391,7 @@ fn params(resources: &PathTracerResources, inputs: &PathTracerInputs<'_>) -> gpu
         environment_norm: emitters.environment_norm,
         environment_size: emitters.environment_size,
         environment_rotation: emitters.environment_rotation,
-        _pad: [0; 2],
+        spans_pixel: u32::from(settings.spans_pixel),
+        _pad: 0,
     }
 }

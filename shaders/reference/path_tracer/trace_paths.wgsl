@@ -23,6 +23,8 @@ struct Params {
     environment_norm: f32,
     environment_rotation: f32,
     environment_size: vec2u,
+    // 1: paths begin all over a pixel; 0: in its middle
+    spans_pixel: u32,
 }
 
 @group(0) @binding(0) var<uniform> params: Params;
@@ -176,7 +178,8 @@ fn path_begin(pixel: vec2u, u: vec2f) -> Path {
 
 fn path_trace(pixel: vec2u, sample: u32) -> vec3f {
     var random = PathRandom(pixel, sample, 0u);
-    var path = path_begin(pixel, path_random(&random).xy);
+    let within = path_random(&random).xy;
+    var path = path_begin(pixel, select(vec2f(0.5), within, params.spans_pixel == 1u));
     loop {
         let hit = bvh_closest(path.origin, path.direction, BVH_FURTHEST, BVH_ALL);
         path_cross_lamps(&path, hit.distance);
