@@ -1141,3 +1141,102 @@ fn an_accumulation_begins_anew_by_itself() {
     assert_ne!(found, three);
     assert_no_errors(&gpu);
 }
+
+#[test]
+fn the_accumulator_tells_how_noisy_its_mean_is() {
+    let Some(gpu) = gpu() else { return };
+    let (device, queue) = (&gpu.device, &gpu.queue);
+    // A power of two that would overflow if it were squared.
+    for scale in [1.0, 2f64.powi(80), 2f64.powi(-80)] {
+        let radiance = Radiance::new(device, [5, 3]).unwrap();
+        let (pass, mut resources) = (
+            Accumulator::new(device),
+            AccumulatorResources::new(device, [5, 3]).unwrap(),
+        );
+        let frames = [3.0, 5.0, 4.0, 0.0, 6.0, 4.5];
+        for (index, light) in frames.iter().enumerate() {
+            let told = resources.relative_variance_blocking(device, queue).unwrap();
+            assert_eq!(told.is_finite(), index > 1, "after {index}");
+            let mut encoder = device.create_command_encoder(&Default::default());
+            let light = light * scale;
+            encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: radiance.view(),
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color {
+                            r: light,
+                            g: 2.0 * light,
+                            b: 0.0,
+                            a: 1.0,
+                        }),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })],
+                ..Default::default()
+            });
+            let inputs = AccumulatorInputs {
+                queue,
+                radiance: &radiance,
+                timestamps: None,
+            };
+            pass.record(&mut encoder, &mut resources, &inputs);
+            queue.submit([encoder.finish()]);
+        }
+        let count = frames.len() as f64;
+        let mean = frames.iter().sum::<f64>() / count;
+        let spread: f64 = frames.iter().map(|x| (x - mean).powi(2)).sum();
+        let exact = spread / (count * (count - 1.0) * mean * mean) / (1.0 + 1e-4);
+        let told = resources.relative_variance_blocking(device, queue).unwrap();
+        assert!((told / exact - 1.0).abs() < 1e-5, "scale {scale:e}: {told} {exact}");
+        let last = read_rgba32float_blocking(device, queue, resources.mean().view().texture()).unwrap()[7];
+        let shown = [mean * scale, 2.0 * mean * scale, 0.0, 1.0];
+        assert!(last.iter().zip(shown).all(|(&a, b)| (f64::from(a) - b).abs() <= 1e-6 * b), "{last:?}");
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+#[cfg(feature = "bvh")]
+fn other_settings_are_as_those_of_a_new_renderer() {
+    let Some(gpu) = gpu() else { return };
+    let scene = samples::cornell(0.3);
+    let with = |changes: &[(&str, &str)]| {
+        let mut settings = Settings {
+            photons: 4000,
+            bounces: 2,
+            shadow_map_size: 64,
+            tracer_kind: TracerKind::Bvh,
+            ..Settings::fast()
+        };
+        changes.iter().for_each(|(key, value)| settings.set(key, value).unwrap());
+        settings
+    };
+    let all = [
+        with(&[]),
+        with(&[("photons", "9000"), ("bounces", "3"), ("splatter.photons", "50")]),
+        with(&[("splatter.subsampling", "1"), ("shadow_maps.size", "128")]),
+        with(&[("splatter.shape", "quads"), ("photons", "2000")]),
+        with(&[("photons", "0")]),
+        with(&[("upsampler.levels", "by-levels"), ("composite.fused", "on")]),
+    ];
+    let mut kept = Offline::new(&gpu, scene.clone(), &all[0], 0, [48, 32], Component::All).unwrap();
+    for settings in all.iter().chain(&all[..2]) {
+        kept.renderer.set_settings(settings).unwrap();
+        kept.render_frame(None).unwrap();
+        let mut fresh = Offline::new(&gpu, scene.clone(), settings, 0, [48, 32], Component::All).unwrap();
+        fresh.render_frame(None).unwrap();
+        assert!(kept.read().unwrap() == fresh.read().unwrap(), "{:?}", settings.entries());
+        let bytes = |offline: &Offline<'_>| (offline.renderer.memory_use(), offline.view.memory_use());
+        assert_eq!(bytes(&kept), bytes(&fresh));
+    }
+    let refused = Settings {
+        bounces: 65,
+        ..with(&[])
+    };
+    assert!(kept.renderer.set_settings(&refused).is_err());
+    assert_eq!(kept.renderer.settings(), &all[1]);
+    kept.render_frame(None).unwrap();
+    assert_no_errors(&gpu);
+}

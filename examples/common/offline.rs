@@ -42,6 +42,8 @@ pub(crate) struct Offline<'a> {
     pub(crate) in_motion: bool,
     /// Whether no frame was rendered so far.
     is_first: bool,
+    /// How many pictures' photons of the random sequence are left to others.
+    pub(crate) pictures_before: u32,
     /// Where surface lights stand, if there are any.
     pub(crate) points: Vec<SurfacePoint>,
     scene: Scene,
@@ -99,6 +101,7 @@ impl<'a> Offline<'a> {
             bvh,
             in_motion: accumulator.is_none(),
             is_first: true,
+            pictures_before: 0,
             points,
             accumulator,
             scene,
@@ -142,7 +145,9 @@ impl<'a> Offline<'a> {
         self.renderer.prepare(queue, &mut self.geometry, &mut cameras)?;
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let geometry: &dyn Geometry = &self.geometry;
-        let sample_offset = accumulated.wrapping_mul(self.renderer.settings().photons.max(1));
+        let settings = self.renderer.settings();
+        let frames_before = self.pictures_before.wrapping_mul(settings.frames).wrapping_add(accumulated);
+        let sample_offset = frames_before.wrapping_mul(settings.photons.max(1));
         let scene_inputs = SceneInputs {
             queue,
             geometry,

@@ -112,13 +112,23 @@ pub(crate) fn errors(gpu: &Gpu, arguments: &Arguments) -> Result<(), String> {
         "{} places, {} photons, {} bounces\n",
         arguments.places, arguments.photons, arguments.bounces
     );
+    let all_settings = |overrides| {
+        let mut settings = settings([arguments.places, arguments.photons, arguments.bounces], overrides)?;
+        for pair in &arguments.set {
+            let (key, value) = pair
+                .split_once('=')
+                .ok_or_else(|| format!("--set {pair:?}: expected KEY=VALUE"))?;
+            settings.set(key.trim(), value.trim()).map_err(|e| e.to_string())?;
+        }
+        Ok::<_, String>(settings)
+    };
     let ways: Vec<_> = WAYS.iter().filter(|w| w.0.contains(&arguments.ways)).collect();
     let mut rows: Vec<String> = ways.iter().map(|(name, _)| format!("| {name} |")).collect();
     let mut head = String::from("| error: median, 95th percentile, share within 1 % |");
     for name in &arguments.samples {
         let scene = samples::by_name(name, 0.3).ok_or_else(|| format!("there is no sample {name}"))?;
         let filled = |way: &str, overrides| {
-            let mut settings = settings([arguments.places, arguments.photons, arguments.bounces], overrides)?;
+            let mut settings = all_settings(overrides)?;
             if way.contains("environment") {
                 settings.set("tracer.kind", "image-space").map_err(|e| e.to_string())?;
             }
@@ -133,7 +143,7 @@ pub(crate) fn errors(gpu: &Gpu, arguments: &Arguments) -> Result<(), String> {
         let noise: Vec<f64> = truths.iter().map(|t| t[1] / t[0]).collect();
         head += &format!(" {name} (noise {:.2} %) |", 100.0 * median(&noise));
         for ((way, overrides), row) in ways.iter().zip(&mut rows) {
-            let settings = settings([arguments.places, arguments.photons, arguments.bounces], overrides)?;
+            let settings = all_settings(overrides)?;
             let light = match shape(&settings) {
                 Some(shape) => {
                     let tile = (shape, settings.illumination_maps.hemisphere_size);

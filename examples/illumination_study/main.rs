@@ -55,6 +55,9 @@ struct Arguments {
     /// Photons of `gather`
     #[arg(long, default_value_t = 1_300_000)]
     photons: u32,
+    /// Settings of all ways of `gather`, repeatable
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
     /// Part of the adapter's name or backend
     #[arg(long)]
     adapter: Option<String>,

@@ -107,6 +107,14 @@ impl EnvMapPlacement {
         }
     }
 
+    /// Selects anew, by other settings; so many of the old places stay in use until that arrives.
+    pub(super) fn start_over(&mut self, limit: usize) {
+        self.ongoing = None;
+        if let Some(centers) = &mut self.centers {
+            centers.truncate(limit);
+        }
+    }
+
     /// Places the maps by hand.
     pub(super) fn set_centers(&mut self, centers: &[DVec3]) {
         *self = Self {

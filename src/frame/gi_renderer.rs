@@ -93,6 +93,20 @@ struct Passes {
     composite: Composite,
 }
 
+impl Passes {
+    fn new(device: &wgpu::Device, settings: &Settings) -> Result<Self, Error> {
+        Ok(Self {
+            g_buffer_capture: GBufferCapture::new(),
+            shadows: ShadowPasses::new(device),
+            direct: DirectPasses::new(device, settings),
+            env_map_selector: EnvMapSelector::new(device),
+            photons: PhotonPasses::new(device, settings),
+            view: ViewPasses::new(device, settings)?,
+            composite: Composite::new(device, wgpu::TextureFormat::Rgba32Float),
+        })
+    }
+}
+
 /// What the scene is, as of the last `set_scene`.
 #[derive(Debug)]
 struct SceneState {
@@ -190,19 +204,10 @@ impl GiRenderer {
     /// [`Error::InvalidSetting`], [`Error::MissingFeatures`].
     pub fn new(device: &wgpu::Device, settings: &Settings) -> Result<Self, Error> {
         settings.validate()?;
-        let passes = Passes {
-            g_buffer_capture: GBufferCapture::new(),
-            shadows: ShadowPasses::new(device),
-            direct: DirectPasses::new(device, settings),
-            env_map_selector: EnvMapSelector::new(device),
-            photons: PhotonPasses::new(device, settings),
-            view: ViewPasses::new(device, settings)?,
-            composite: Composite::new(device, wgpu::TextureFormat::Rgba32Float),
-        };
         Ok(Self {
             device: device.clone(),
             settings: settings.clone(),
-            passes,
+            passes: Passes::new(device, settings)?,
             black: Irradiance::new(device, [1, 1], wgpu::TextureFormat::Rgba32Float)?,
             environment: Environment::black(device)?,
             environment_image: None,
@@ -228,6 +233,44 @@ impl GiRenderer {
             guiding: GuidingSchedule::default(),
             selection: None,
         })
+    }
+
+    /// Takes other settings from the next `set_scene` on: what the old ones made and the new ones do not share is dropped, and
+    /// what views hold is made anew when they are recorded. Pipelines stay where none but numbers change that shaders are told
+    /// (photons, bounces, maps, kernels, sub-sampling); so do the places of environment maps, as many as there may be. Photons
+    /// of before are forgotten, kept light too. For a change now and then, as a [`BudgetController`](super::BudgetController)
+    /// asks for, not for every frame.
+    ///
+    /// # Errors
+    /// As [`GiRenderer::new`]; the old settings stay then.
+    pub fn set_settings(&mut self, settings: &Settings) -> Result<(), Error> {
+        settings.validate()?;
+        if *settings == self.settings {
+            return Ok(());
+        }
+        if !settings.share_pipelines(&self.settings) {
+            self.passes = Passes::new(&self.device, settings)?;
+        }
+        self.direct = None;
+        self.indirect = None;
+        self.photons_frame = None;
+        self.selection = None;
+        self.recapture.forget();
+        self.guiding = GuidingSchedule::default();
+        if settings.environment_suns != self.settings.environment_suns {
+            self.stand_ins.environment_changed();
+        }
+        let selects_alike = |a: &Settings, b: &Settings| {
+            (a.selector, a.env_map_count, a.env_map_size) == (b.selector, b.env_map_count, b.env_map_size)
+        };
+        if !selects_alike(settings, &self.settings) {
+            self.placement.start_over(settings.env_map_count as usize);
+        }
+        self.streamed = settings.traced_photons();
+        self.settings = settings.clone();
+        self.generation = next_generation();
+        self.revision += 1;
+        Ok(())
     }
 
     /// Gives the image that an environment light refers to, whatever the index in [`LightKind::Environment`]: of a `Scene` that

@@ -1,10 +1,12 @@
 //! Layer 4: everything composed. [`Settings`] say how much to spend, [`Plan`] which stages a scene needs and why,
 //! [`GiRenderer`] records them in order. It uses public passes only: whatever it does, a host can do by hand.
 
+mod budget;
 mod caustic_view;
 mod direct_scene;
 mod direct_view;
 mod env_map_placement;
+mod error_estimate;
 mod gi_renderer;
 mod guiding_schedule;
 mod hemisphere_scene;
@@ -26,6 +28,8 @@ mod surface_light_scene;
 mod surface_light_view;
 mod traced_photons;
 
+pub use budget::{Budget, BudgetController, Rung};
+pub use error_estimate::{ErrorEstimate, WIDENING};
 pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};
 #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
 pub use photon_feeder::PhotonFeeder;

@@ -579,6 +579,30 @@ impl Settings {
         }
     }
 
+    /// Whether the passes of one serve the other: only numbers differ that shaders are told, or that buffers and images are made
+    /// by.
+    pub(super) fn share_pipelines(&self, other: &Self) -> bool {
+        let like_other = Self {
+            frames: other.frames,
+            photons: other.photons,
+            bounces: other.bounces,
+            env_map_count: other.env_map_count,
+            env_maps_at_lights: other.env_maps_at_lights,
+            env_map_size: other.env_map_size,
+            environment_suns: other.environment_suns,
+            shadow_map_size: other.shadow_map_size,
+            selector: other.selector,
+            splatter: other.splatter,
+            radius_alpha: other.radius_alpha,
+            subsampling: other.subsampling,
+            specular_paths: other.specular_paths,
+            specular_surfaces: other.specular_surfaces,
+            ..self.clone()
+        };
+        // Without photons there is no selection among them.
+        like_other == *other && self.selects_photons() == other.selects_photons()
+    }
+
     /// Whether photons stay that nothing has changed for.
     pub(super) fn selects_photons(&self) -> bool {
         let is_wanted = match self.indirect_method {

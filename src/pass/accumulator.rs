@@ -1,13 +1,14 @@
 //! Plain mean of frames, in f32: with a jittered camera and fresh photons every frame, noise falls and edges smooth.
 //!
 //! Input: [`Radiance`] of a frame. Output: the mean so far, in which each of n frames weighs 1/n; it begins anew when what it
-//! shows changes ([`AccumulatorResources::follow`]). Cost: one full-screen pass and three textures. Limits: blur of the
+//! shows changes ([`AccumulatorResources::follow`]); and how noisy that still is
+//! ([`AccumulatorResources::relative_variance_blocking`]). Cost: one full-screen pass and three textures. Limits: blur of the
 //! density estimate falls only as far as its kernels narrow with the frames ([`progressive_scale`](super::progressive_scale)).
 
 use super::full_screen::{FullScreen, FullScreenResources};
 use crate::gpu::{self as device, Slot};
 use crate::resource::Radiance;
-use crate::{Error, Timestamps, wgsl};
+use crate::{Error, Timestamps, read_rgba32float_blocking, wgsl};
 
 pub(crate) mod gpu {
     use bytemuck::{Pod, Zeroable};
@@ -16,13 +17,16 @@ pub(crate) mod gpu {
     #[derive(Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
     pub(crate) struct Params {
-        pub(crate) history_weight: f32,
+        pub(crate) frames: f32,
         pub(crate) mean_weight: f32,
     }
 }
 
 /// Bindings of `shaders/pass/accumulator.wgsl`, in order.
 pub(crate) const SLOTS: [Slot; 3] = [Slot::Uniform, Slot::Texture, Slot::Texture];
+
+/// Part of the mean radiance that stands in for the radiance of black pixels, as in [`metrics`](crate::reference::metrics).
+const BLACK_GUARD: f64 = 0.01;
 
 /// The pass.
 #[derive(Debug)]
@@ -82,7 +86,7 @@ impl Accumulator {
             _ => (&resources.sums[1], &resources.sums[0]),
         };
         let params = gpu::Params {
-            history_weight: if resources.frames == 0 { 0.0 } else { 1.0 },
+            frames: resources.frames as f32,
             mean_weight: 1.0 / (resources.frames + 1) as f32,
         };
         resources.frames += 1;
@@ -108,7 +112,7 @@ impl AccumulatorResources {
             size,
             layers: 1,
             format: Accumulator::FORMAT,
-            usage: U::RENDER_ATTACHMENT | U::TEXTURE_BINDING,
+            usage: U::RENDER_ATTACHMENT | U::TEXTURE_BINDING | U::COPY_SRC,
         };
         let view = || Ok::<_, Error>(device::texture(device, &spec)?.create_view(&Default::default()));
         let inner = FullScreenResources::new::<gpu::Params>(device, "lightfall::Accumulator::params")?;
@@ -146,6 +150,30 @@ impl AccumulatorResources {
     /// The mean of all frames since the last restart.
     pub fn mean(&self) -> &Radiance {
         &self.mean
+    }
+
+    /// The noise left in the mean, told by how far frames spread: relMSE ([`metrics`](crate::reference::metrics)) that is
+    /// variance, of the sum of the channels; infinite with fewer than two frames. Photons of one sequence are spread more evenly
+    /// over many frames than by chance, so that the mean is nearer to the truth than this says; blur, which all frames share, is
+    /// no part of it. Submits and waits.
+    ///
+    /// # Errors
+    /// [`Error::ReadBack`], [`Error::LimitExceeded`].
+    pub fn relative_variance_blocking(&self, device: &wgpu::Device, queue: &wgpu::Queue) -> Result<f64, Error> {
+        if self.frames < 2 {
+            return Ok(f64::INFINITY);
+        }
+        let last = self.sums[(self.frames as usize - 1) % 2].texture();
+        let texels = read_rgba32float_blocking(device, queue, last)?;
+        let frames = f64::from(self.frames);
+        let light = |texel: &[f32; 4]| texel[..3].iter().map(|&v| f64::from(v)).sum::<f64>() / frames;
+        let count = texels.len().max(1) as f64;
+        let guard = BLACK_GUARD * texels.iter().map(light).sum::<f64>() / count;
+        let of_pixel = |texel: &[f32; 4]| {
+            let (squared, variance) = (light(texel).powi(2), f64::from(texel[3]) / (frames * (frames - 1.0)));
+            if squared > 0.0 { variance * squared / (squared + guard * guard) } else { 0.0 }
+        };
+        Ok(texels.iter().map(of_pixel).sum::<f64>() / count)
     }
 
     /// Bytes allocated.

@@ -1,0 +1,207 @@
+//! Error and time of a point.
+
+use crate::Arguments;
+use crate::common::adapter::Gpu;
+use crate::common::clock::Clock;
+use crate::common::offline::{Component, Offline};
+use crate::common::reference::Reference;
+use crate::common::truth_file;
+use crate::rows::{Key, Row};
+use crate::sweep::Point;
+use lightfall::frame::{ErrorEstimate, IndirectMethod, Settings};
+use lightfall::pass::HopStatistics;
+use lightfall::reference::metrics::{self, Image, Truth};
+use lightfall::reference::{PathComponent, PathTracerSettings};
+use lightfall::scene::{Scene, SceneSummary};
+
+/// A scene, and its truths as they come to be needed.
+pub(crate) struct Subject<'a> {
+    gpu: &'a Gpu,
+    arguments: &'a Arguments,
+    name: &'a str,
+    scene: Scene,
+    truths: Vec<(TruthKind, Truth)>,
+}
+
+/// What a truth is of.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct TruthKind {
+    is_direct: bool,
+    spans_pixel: bool,
+    bounces: u32,
+}
+
+impl<'a> Subject<'a> {
+    pub(crate) fn new(gpu: &'a Gpu, arguments: &'a Arguments, name: &'a str, scene: Scene) -> Self {
+        Self {
+            gpu,
+            arguments,
+            name,
+            scene,
+            truths: Vec::new(),
+        }
+    }
+
+    /// Whether a point is of anything here: shadows are where lights have an extent.
+    pub(crate) fn concerns(&self, point: &Point) -> bool {
+        let has_extent = || SceneSummary::of(&self.scene).is_ok_and(|s| s.lights_with_extent > 0);
+        !point.is_direct || (self.arguments.truth.is_none() && has_extent())
+    }
+
+    pub(crate) fn key(&self, point: &Point) -> Key {
+        let arguments = self.arguments;
+        Key {
+            adapter: self.gpu.info.name.clone(),
+            scene: self.name.into(),
+            size: arguments.size,
+            samples: if arguments.truth.is_some() { 0 } else { arguments.samples },
+            component: if point.is_direct { "direct" } else { "indirect" }.into(),
+            base: point.base.clone(),
+            tracer: point.tracer.clone(),
+            knob: point.knob.clone(),
+            value: point.value.clone(),
+        }
+    }
+
+    pub(crate) fn measure(&mut self, point: &Point) -> Result<Row, String> {
+        let mut clock = Clock::new(self.gpu);
+        let mut offline = self.offline(point, &point.settings)?;
+        for _ in 0..point.settings.frames {
+            clock.frame(self.gpu, &mut offline)?;
+        }
+        let own = read(&offline)?;
+        if point.settings.frames == 1 {
+            for _ in 0..self.arguments.rounds {
+                clock.frame(self.gpu, &mut offline)?;
+            }
+        }
+        let statistics = offline.statistics().map_err(|e| e.to_string())?;
+        let estimate = self.estimate(point, &mut offline, &own)?;
+        drop(offline);
+        self.gpu.check()?;
+        let comparison = metrics::compare(&self.image(own), self.truth(point)?).map_err(|e| e.to_string())?;
+        if !comparison.finite {
+            return Err(format!("{}, {}: the picture is not finite", self.name, point.name()));
+        }
+        let key = self.key(point);
+        Ok(Row {
+            adapter: key.adapter,
+            scene: key.scene,
+            size: key.size,
+            samples: key.samples,
+            component: key.component,
+            base: key.base,
+            tracer: key.tracer,
+            knob: key.knob,
+            value: key.value,
+            ms: clock.frame_ms()[0] * f64::from(point.settings.frames),
+            relmse: comparison.relmse,
+            bias: comparison.bias,
+            noise: estimate.map(|e| e.noise),
+            blur: estimate.map(|e| e.blur),
+            unconfirmed: (!point.is_direct).then(|| unconfirmed(&statistics)),
+        })
+    }
+
+    fn offline(&self, point: &Point, settings: &Settings) -> Result<Offline<'a>, String> {
+        let component = match point.is_direct {
+            true => Component::Direct,
+            false => Component::Indirect,
+        };
+        let size = [self.arguments.size; 2];
+        let mut offline =
+            Offline::new(self.gpu, self.scene.clone(), settings, 0, size, component).map_err(|e| e.to_string())?;
+        offline.stand_still();
+        Ok(offline)
+    }
+
+    /// Where a picture is one frame of kernels.
+    fn estimate(
+        &self,
+        point: &Point,
+        offline: &mut Offline<'_>,
+        own: &[[f32; 3]],
+    ) -> Result<Option<ErrorEstimate>, String> {
+        let settings = &point.settings;
+        if point.is_direct || settings.frames > 1 || settings.indirect_method != IndirectMethod::Splatting {
+            return Ok(None);
+        }
+        let render = |offline: &mut Offline<'_>, picture: u32| {
+            offline.pictures_before = picture;
+            offline.render_frame(None).map_err(|e| e.to_string())?;
+            read(offline)
+        };
+        let other = render(offline, 1)?;
+        let mut widened = self.offline(point, &ErrorEstimate::widened(settings))?;
+        let widened = [render(&mut widened, 0)?, render(&mut widened, 1)?];
+        ErrorEstimate::of([own, &other], [&widened[0], &widened[1]])
+            .map(Some)
+            .map_err(|e| e.to_string())
+    }
+
+    fn image(&self, rgb: Vec<[f32; 3]>) -> Image {
+        Image {
+            width: self.arguments.size,
+            height: self.arguments.size,
+            rgb,
+        }
+    }
+
+    fn truth(&mut self, point: &Point) -> Result<&Truth, String> {
+        let kind = TruthKind {
+            is_direct: point.is_direct,
+            spans_pixel: point.settings.frames > 1,
+            // Of a knob that is turned the base's.
+            bounces: Settings::preset(&point.base).map_or(0, |base| base.bounces),
+        };
+        if let Some(index) = self.truths.iter().position(|(other, _)| *other == kind) {
+            return Ok(&self.truths[index].1);
+        }
+        let truth = match &self.arguments.truth {
+            Some(path) => {
+                let truth = truth_file::read_truth(path)?;
+                let factor = truth.image.width / self.arguments.size;
+                truth.downsampled(factor.max(1)).map_err(|e| format!("{}: {e}", path.display()))?
+            }
+            None => self.traced(kind)?,
+        };
+        self.truths.push((kind, truth));
+        Ok(&self.truths[self.truths.len() - 1].1)
+    }
+
+    fn traced(&self, kind: TruthKind) -> Result<Truth, String> {
+        let paths = PathTracerSettings {
+            component: match kind.is_direct {
+                true => PathComponent::Direct,
+                false => PathComponent::Indirect,
+            },
+            bounces: kind.bounces,
+            spans_pixel: kind.spans_pixel,
+            ..Default::default()
+        };
+        let size = [self.arguments.size; 2];
+        let mut reference =
+            Reference::new(self.gpu, self.scene.clone(), &paths, 0, size).map_err(|e| e.to_string())?;
+        for _ in 0..self.arguments.samples {
+            reference.render_sample(None).map_err(|e| e.to_string())?;
+        }
+        let estimate = reference.read().map_err(|e| e.to_string())?;
+        Ok(Truth {
+            standard_error: Some(estimate.standard_error),
+            ..Truth::new(self.image(estimate.mean))
+        })
+    }
+}
+
+fn read(offline: &Offline<'_>) -> Result<Vec<[f32; 3]>, String> {
+    offline.read().map_err(|e| e.to_string())
+}
+
+/// Share of the flux that surfaces sent out.
+fn unconfirmed(hops: &[HopStatistics]) -> f64 {
+    let sum = |of: fn(&HopStatistics) -> [f32; 3]| -> f64 {
+        hops.iter().skip(1).flat_map(of).map(f64::from).sum()
+    };
+    let emitted = sum(|h| h.emitted);
+    if emitted > 0.0 { (sum(|h| h.lost) + sum(|h| h.tentative)) / emitted } else { 0.0 }
+}

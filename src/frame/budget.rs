@@ -1,0 +1,317 @@
+//! Settings that keep to a budget: along a ladder of settings, each rung slower than the one before and nearer to the truth,
+//! by what frames take, or by how far off they are.
+//!
+//! Between two rungs the number of photons goes from that of the one to that of the other, everything else is as on the lower
+//! one. What a place on the ladder takes is known but for the scene: readings are taken to be a power of it, times the scene's
+//! load. A reading outside of the dead band moves the place by what that says; two readings in a row at different places say
+//! what the power is.
+
+use super::{Settings, TracerKind};
+use crate::Error;
+
+/// What to keep to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Budget {
+    /// Of a frame, in milliseconds, or whatever unit readings have. It is aimed a tenth below.
+    Time(f64),
+    /// Of a frame, relMSE ([`metrics`](crate::reference::metrics)), as [`ErrorEstimate`](super::ErrorEstimate) and
+    /// [`AccumulatorResources::relative_variance_blocking`](crate::pass::AccumulatorResources::relative_variance_blocking)
+    /// tell it.
+    Error(f64),
+}
+
+/// Settings, and what they take and gain over those of other rungs: only ratios count.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rung {
+    /// All of them.
+    pub settings: Settings,
+    /// Of a frame.
+    pub time: f64,
+    /// relMSE of a frame.
+    pub error: f64,
+}
+
+/// Chooses settings by readings.
+#[derive(Debug, Clone)]
+pub struct BudgetController {
+    budget: Budget,
+    ladder: Vec<Rung>,
+    /// On the ladder, from 0 up to its last rung.
+    place: f64,
+    settings: Settings,
+    /// Of the place where it is.
+    readings: Vec<f64>,
+    /// Logarithms of what the ladder says and of the reading, where it was before.
+    last: Option<[f64; 2]>,
+    /// Power of what the ladder says that readings are.
+    gain: f64,
+}
+
+/// Readings that a place is left by the median of.
+const WINDOW: usize = 3;
+
+/// Readings after a change that do not count: buffers are made, and readings are of frames before.
+const SETTLING: usize = 1;
+
+/// Share of a time that is aimed at.
+const AIM: f64 = 0.9;
+
+/// How far a reading may be from what is aimed at, as a factor, before anything is changed.
+const DEAD_BAND: f64 = 1.1;
+
+/// Bounds of the gain: a load that changes while the place does is taken for one.
+const GAINS: [f64; 2] = [0.25, 3.0];
+
+/// Least way along the ladder, as a logarithm, that says anything of the gain.
+const LEAST_STEP: f64 = 0.1;
+
+impl Rung {
+    /// The measured front of settings whose photons this traces, from the fastest on: figures of `docs/tradeoff.md`.
+    pub fn ladder(tracer: TracerKind) -> Vec<Self> {
+        let rung = |settings: Settings, photons: u32, time: f64, error: f64| Self {
+            settings: Settings {
+                tracer_kind: tracer,
+                photons,
+                ..settings
+            },
+            time,
+            error,
+        };
+        vec![
+            rung(Settings::fast(), 15_000, 0.5, 2.0),
+            rung(Settings::fast(), 60_000, 1.0, 1.0),
+            rung(Settings::fast(), 240_000, 3.0, 0.7),
+            rung(Settings::balanced(), 500_000, 8.0, 0.3),
+        ]
+    }
+}
+
+impl BudgetController {
+    /// Begins in the middle of the ladder.
+    ///
+    /// # Errors
+    /// [`Error::InvalidSetting`] for a budget that is not above 0, settings that are not valid, and a ladder without rungs, or
+    /// whose times do not rise or errors do not fall from each rung to the next.
+    pub fn new(budget: Budget, ladder: Vec<Rung>) -> Result<Self, Error> {
+        let invalid = |key: &str, value: String, expected: &str| Error::InvalidSetting {
+            key: key.into(),
+            value,
+            expected: expected.into(),
+        };
+        let (Budget::Time(most) | Budget::Error(most)) = budget;
+        if !(most > 0.0 && most.is_finite()) {
+            return Err(invalid("budget", most.to_string(), "above 0"));
+        }
+        let Some(first) = ladder.first() else {
+            return Err(invalid("ladder", "no rung".into(), "one or more"));
+        };
+        let settings = first.settings.clone();
+        for (index, rung) in ladder.iter().enumerate() {
+            rung.settings.validate()?;
+            let is_positive = [rung.time, rung.error].iter().all(|&v| v > 0.0 && v.is_finite());
+            let follows = index == 0 || {
+                let last = &ladder[index - 1];
+                rung.time > last.time && rung.error < last.error
+            };
+            if !(is_positive && follows) {
+                let expected = "times above 0 that rise, and errors above 0 that fall, from rung to rung";
+                return Err(invalid("ladder", format!("rung {index}"), expected));
+            }
+        }
+        let mut controller = Self {
+            budget,
+            place: 0.5 * (ladder.len() - 1) as f64,
+            ladder,
+            settings,
+            readings: Vec::new(),
+            last: None,
+            gain: 1.0,
+        };
+        controller.settings = controller.settings_here();
+        Ok(controller)
+    }
+
+    /// What to render the next frame with.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Where on the ladder that is: 0 for its first rung, 1 for the next, and so on, and between two of them.
+    pub fn place(&self) -> f64 {
+        self.place
+    }
+
+    /// Takes what a frame took, or how far off it is, in the unit of the budget; one call a frame. Returns other settings once
+    /// there is reason to change them ([`GiRenderer::set_settings`](super::GiRenderer::set_settings)). A reading that is not a
+    /// number above 0 is left out.
+    pub fn observe(&mut self, reading: f64) -> Option<&Settings> {
+        if !(reading > 0.0 && reading.is_finite()) {
+            return None;
+        }
+        self.readings.push(reading);
+        if self.readings.len() < SETTLING + WINDOW {
+            return None;
+        }
+        let mut window = self.readings[self.readings.len() - WINDOW..].to_vec();
+        self.readings = window.clone();
+        window.sort_by(f64::total_cmp);
+        let now = [self.log_at(self.place), window[WINDOW / 2].ln()];
+        let wanted = match self.budget {
+            Budget::Time(most) => (AIM * most).ln(),
+            Budget::Error(most) => most.ln(),
+        };
+        let missing = wanted - now[1];
+        // Of the first readings after a change: later ones may be of another load.
+        if let Some([ladder, read]) = self.last.take()
+            && (now[0] - ladder).abs() >= LEAST_STEP
+        {
+            self.gain = ((now[1] - read) / (now[0] - ladder)).clamp(GAINS[0], GAINS[1]);
+        }
+        if missing.abs() <= DEAD_BAND.ln() {
+            return None;
+        }
+        let place = self.place_of(now[0] + missing / self.gain);
+        self.last = Some(now);
+        if place == self.place {
+            return None;
+        }
+        self.place = place;
+        self.readings.clear();
+        let settings = self.settings_here();
+        let is_other = settings != self.settings;
+        self.settings = settings;
+        is_other.then_some(&self.settings)
+    }
+
+    /// What the ladder says of a rung.
+    fn log_of(&self, rung: &Rung) -> f64 {
+        match self.budget {
+            Budget::Time(_) => rung.time.ln(),
+            Budget::Error(_) => rung.error.ln(),
+        }
+    }
+
+    /// The rungs below and above a place, and how far it is from the one to the other.
+    fn between(&self, place: f64) -> ([&Rung; 2], f64) {
+        let below = (place as usize).min(self.ladder.len() - 1);
+        let above = (below + 1).min(self.ladder.len() - 1);
+        ([&self.ladder[below], &self.ladder[above]], place - below as f64)
+    }
+
+    fn log_at(&self, place: f64) -> f64 {
+        let ([below, above], part) = self.between(place);
+        let [below, above] = [below, above].map(|rung| self.log_of(rung));
+        below + part * (above - below)
+    }
+
+    /// Where the ladder says so much; an end of it where nothing does.
+    fn place_of(&self, log: f64) -> f64 {
+        // Of errors, which fall, upside down.
+        let sign = match self.budget {
+            Budget::Time(_) => 1.0,
+            Budget::Error(_) => -1.0,
+        };
+        let logs: Vec<f64> = self.ladder.iter().map(|rung| sign * self.log_of(rung)).collect();
+        let log = sign * log;
+        let above = logs.partition_point(|&l| l <= log);
+        match above {
+            0 => 0.0,
+            _ if above == logs.len() => (above - 1) as f64,
+            _ => (above - 1) as f64 + (log - logs[above - 1]) / (logs[above] - logs[above - 1]),
+        }
+    }
+
+    fn settings_here(&self) -> Settings {
+        let ([below, above], part) = self.between(self.place);
+        let photons = |rung: &Rung| f64::from(rung.settings.photons.max(1)).ln();
+        let between = photons(below) + part * (photons(above) - photons(below));
+        let photons = match part {
+            0.0 => below.settings.photons,
+            _ => between.exp().round() as u32,
+        };
+        Settings {
+            photons,
+            ..below.settings.clone()
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const KINDS: [TracerKind; 1] = [TracerKind::ImageSpace];
+
+    /// A clock: some of a frame does not depend on photons, and no two frames are alike.
+    fn frame_ms(settings: &Settings, load: f64, fixed: f64, frame: usize) -> f64 {
+        let noise = 1.0 + 0.04 * ((frame * 7919 % 101) as f64 / 50.0 - 1.0);
+        load * (fixed + f64::from(settings.photons) / 60_000.0) * noise
+    }
+
+    #[test]
+    fn a_load_that_doubles_and_halves_is_followed_within_ten_frames_and_no_more() {
+        for kind in KINDS {
+            for fixed in [0.05, 0.5, 1.0] {
+                let ladder = Rung::ladder(kind);
+                let mut controller = BudgetController::new(Budget::Time(10.0), ladder).unwrap();
+                let (mut changes, mut since) = (0, 0);
+                for frame in 0..400 {
+                    let load = [4.0, 8.0, 4.0, 2.0, 4.0, 5.0, 3.0, 4.0][frame / 50];
+                    if frame % 50 == 0 {
+                        (changes, since) = (0, 0);
+                    }
+                    let ms = frame_ms(controller.settings(), load, fixed, frame);
+                    since += 1;
+                    if since > 10 {
+                        assert!((8.0..=12.0).contains(&ms), "fixed {fixed}, frame {frame}: {ms}");
+                    }
+                    if controller.observe(ms).is_some() {
+                        changes += 1;
+                        assert!(since <= 10 && changes <= 3, "fixed {fixed}, frame {frame}: change {changes}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_kept_ends_at_an_end() {
+        for (budget, place) in [(1e-3, 0.0), (1e6, 3.0)] {
+            let mut controller = BudgetController::new(Budget::Time(budget), Rung::ladder(KINDS[0])).unwrap();
+            for frame in 0..100 {
+                let ms = frame_ms(controller.settings(), 1.0, 0.1, frame);
+                controller.observe(ms);
+            }
+            assert_eq!(controller.place(), place);
+        }
+    }
+
+    #[test]
+    fn an_error_is_kept_to_by_more_photons() {
+        let mut controller = BudgetController::new(Budget::Error(0.012), Rung::ladder(KINDS[0])).unwrap();
+        for _ in 0..30 {
+            let error = 0.01 * (60_000.0 / f64::from(controller.settings().photons)).powf(0.6);
+            controller.observe(error);
+        }
+        let error = 0.01 * (60_000.0 / f64::from(controller.settings().photons)).powf(0.6);
+        assert!((error / 0.012).ln().abs() < 1.1f64.ln(), "{error}");
+    }
+
+    #[test]
+    fn bad_budgets_and_ladders_are_named() {
+        let ladder = Rung::ladder(KINDS[0]);
+        for most in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(BudgetController::new(Budget::Time(most), ladder.clone()).is_err());
+        }
+        assert!(BudgetController::new(Budget::Time(1.0), Vec::new()).is_err());
+        let upside_down: Vec<Rung> = ladder.iter().rev().cloned().collect();
+        let error = BudgetController::new(Budget::Time(1.0), upside_down).unwrap_err();
+        assert!(error.to_string().contains("rung 1"), "{error}");
+        let mut controller = BudgetController::new(Budget::Time(1.0), ladder).unwrap();
+        let before = controller.settings().clone();
+        for _ in 0..10 {
+            assert!(controller.observe(f64::NAN).is_none() && controller.observe(0.0).is_none());
+        }
+        assert_eq!(*controller.settings(), before);
+    }
+}
