@@ -15,7 +15,7 @@ use common::clock::Clock;
 use common::offline::{Component, Offline};
 use common::reference::{self, Reference};
 use common::{arguments, environment_file, exr_file, named_scene, picture, progress};
-use lightfall::frame::{GiRenderer, Plan, Settings};
+use lightfall::frame::{Budget, BudgetController, GiRenderer, Plan, Rung, Settings};
 use lightfall::reference::{PathComponent, PathEstimate, PathTracerSettings};
 use lightfall::scene::{Scene, SceneSummary};
 use serde_json::{Value, json};
@@ -60,7 +60,7 @@ enum Method {
 #[derive(Parser)]
 #[command(
     args_override_self = true,
-    after_help = "Not available yet: --budget-ms, glTF skins."
+    after_help = "Not available yet: glTF skins."
 )]
 struct Arguments {
     /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, bumpy-floor, plane, furnace, two-rooms, pillars,
@@ -108,8 +108,9 @@ struct Arguments {
     /// Frames to accumulate, with jittered camera and fresh photons (default: the preset's)
     #[arg(long)]
     frames: Option<u32>,
-    /// Not available yet: chooses settings for this much GPU time
-    #[arg(long)]
+    /// Chooses settings instead of a preset, so that a frame takes about so much time: of the GPU, or of a software adapter on
+    /// the wall
+    #[arg(long, conflicts_with_all = ["frames", "method"])]
     budget_ms: Option<f64>,
     /// Image to write: .exr (linear radiance) or .png (tone-mapped)
     #[arg(long)]
@@ -120,6 +121,9 @@ struct Arguments {
     /// Machine-readable report to write, JSON
     #[arg(long)]
     stats: Option<PathBuf>,
+    /// Adds to the report how far off the picture is, estimated without a truth, by rendering it four times
+    #[arg(long, requires = "stats")]
+    estimate_error: bool,
     /// Part of the adapter's name or backend (default: a discrete GPU, software last)
     #[arg(long)]
     adapter: Option<String>,
@@ -144,8 +148,12 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     if arguments.preset == reference::PRESET {
         return run_reference(arguments);
     }
-    let component = check_available(arguments)?;
-    let settings = settings(arguments)?;
+    let component = component(arguments);
+    let mut budget = arguments.budget_ms.map(|ms| budget(arguments, ms)).transpose()?;
+    let settings = match &budget {
+        Some(controller) => controller.settings().clone(),
+        None => settings(arguments)?,
+    };
     let times = times(arguments)?;
     let scene = load(arguments, times[0])?;
     let summary = SceneSummary::of(&scene).map_err(|e| format!("{}: {e}", arguments.scene))?;
@@ -174,10 +182,12 @@ fn run(arguments: &Arguments) -> Result<(), String> {
         if number > 0 {
             offline.set_scene(load(arguments, time)?).map_err(|e| e.to_string())?;
         }
-        for _ in 0..settings.frames {
-            clock.frame(&gpu, &mut offline)?;
-            bar.inc(1);
+        match &mut budget {
+            Some(controller) if times.len() == 1 => keep_to(controller, (&gpu, &mut offline), &mut clock)?,
+            Some(controller) => follow(controller, (&gpu, &mut offline), &mut clock).map(drop)?,
+            None => (0..settings.frames).try_for_each(|_| clock.frame(&gpu, &mut offline))?,
         }
+        bar.inc(u64::from(settings.frames));
         gpu.check()?;
         if let Some(out) = &arguments.out {
             let path = if arguments.animate.is_some() {
@@ -194,7 +204,13 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     }
     gpu.check()?;
     if let Some(path) = &arguments.stats {
-        let report = report(&gpu, &offline, &settings, (setup_ms, &clock))?;
+        let mut report = report(&gpu, &offline, (setup_ms, &clock))?;
+        if let Some(controller) = &budget {
+            report["budget"] = json!({"ms": arguments.budget_ms, "place": controller.place()});
+        }
+        if arguments.estimate_error {
+            report["error_estimate"] = error_estimate(&mut offline)?;
+        }
         let text = serde_json::to_string_pretty(&report).map_err(|e| e.to_string())?;
         exr_file::replace_file(path, text.as_bytes())?;
     }
@@ -339,19 +355,71 @@ fn reference_report(
     })
 }
 
-/// Refuses what a later version will do, by name; returns the component.
-fn check_available(arguments: &Arguments) -> Result<Component, String> {
-    let not_yet = |what: &str| Err(format!("{what}: not available yet"));
-    if arguments.budget_ms.is_some() {
-        return not_yet("--budget-ms");
-    }
+fn component(arguments: &Arguments) -> Component {
     match arguments.component {
-        Part::All => Ok(Component::All),
-        Part::Direct => Ok(Component::Direct),
-        Part::Indirect => Ok(Component::Indirect),
-        Part::Caustic => Ok(Component::Caustic),
-        Part::Specular => Ok(Component::Specular),
+        Part::All => Component::All,
+        Part::Direct => Component::Direct,
+        Part::Indirect => Component::Indirect,
+        Part::Caustic => Component::Caustic,
+        Part::Specular => Component::Specular,
     }
+}
+
+/// Chooses among the measured ladder of the tracer, with what else the command line asks for.
+fn budget(arguments: &Arguments, ms: f64) -> Result<BudgetController, String> {
+    if arguments.set.iter().any(|pair| pair.trim_start().starts_with("photons=")) {
+        return Err("--set photons: --budget-ms chooses how many".into());
+    }
+    let tracer = settings(arguments)?.tracer_kind;
+    let mut ladder = Rung::ladder(tracer);
+    for rung in &mut ladder {
+        apply(arguments, &mut rung.settings)?;
+    }
+    BudgetController::new(Budget::Time(ms), ladder).map_err(|e| format!("--budget-ms: {e}"))
+}
+
+/// Renders a frame and tells the controller of it; whether settings are others now.
+fn follow(
+    controller: &mut BudgetController,
+    (gpu, offline): (&Gpu, &mut Offline<'_>),
+    clock: &mut Clock,
+) -> Result<bool, String> {
+    clock.frame(gpu, offline)?;
+    let Some(settings) = clock.last_ms().and_then(|ms| controller.observe(ms)) else {
+        return Ok(false);
+    };
+    offline.set_settings(settings).map_err(|e| e.to_string())?;
+    clock.restart();
+    Ok(true)
+}
+
+/// Renders frames until settings have stayed for a while.
+fn keep_to(
+    controller: &mut BudgetController,
+    (gpu, offline): (&Gpu, &mut Offline<'_>),
+    clock: &mut Clock,
+) -> Result<(), String> {
+    const MOST: usize = 60;
+    const SETTLED: usize = 8;
+    let mut since = 0;
+    for _ in 0..MOST {
+        since = if follow(controller, (gpu, offline), clock)? { 0 } else { since + 1 };
+        if since > SETTLED {
+            break;
+        }
+    }
+    Ok(())
+}
+
+fn error_estimate(offline: &mut Offline<'_>) -> Result<Value, String> {
+    let text = |e: lightfall::Error| e.to_string();
+    if let Some(noise) = offline.accumulated_noise().map_err(text)? {
+        return Ok(json!({"relmse": null, "noise": noise, "bias": null}));
+    }
+    Ok(match offline.estimate_error().map_err(text)? {
+        Some(estimate) => json!({"relmse": estimate.relmse(), "noise": estimate.noise, "bias": estimate.blur}),
+        None => Value::Null,
+    })
 }
 
 fn settings(arguments: &Arguments) -> Result<Settings, String> {
@@ -361,6 +429,15 @@ fn settings(arguments: &Arguments) -> Result<Settings, String> {
             arguments.preset
         )
     })?;
+    apply(arguments, &mut settings)?;
+    if let Some(frames) = arguments.frames {
+        settings.set("frames", &frames.to_string()).map_err(|e| e.to_string())?;
+    }
+    Ok(settings)
+}
+
+/// What the command line says beside a preset.
+fn apply(arguments: &Arguments, settings: &mut Settings) -> Result<(), String> {
     let mut set = |key: &str, value: &str| settings.set(key, value).map_err(|e| e.to_string());
     for pair in &arguments.set {
         let (key, value) = pair
@@ -377,10 +454,7 @@ fn settings(arguments: &Arguments) -> Result<Settings, String> {
     if let Some(bounces) = arguments.bounces {
         set("bounces", &bounces.to_string())?;
     }
-    if let Some(frames) = arguments.frames {
-        set("frames", &frames.to_string())?;
-    }
-    Ok(settings)
+    Ok(())
 }
 
 /// The times to show: one, or a span.
@@ -457,9 +531,9 @@ fn write(gpu: &Gpu, offline: &Offline<'_>, path: &Path, exposure: Option<f32>) -
 fn report(
     gpu: &Gpu,
     offline: &Offline<'_>,
-    settings: &Settings,
     (setup_ms, clock): (f64, &Clock),
 ) -> Result<Value, String> {
+    let settings = offline.renderer.settings();
     let flux_scale = offline.renderer.frame().map_or(1.0, |f| f.flux_scale());
     let watts = |flux: [f32; 3]| flux.map(|v| f64::from(v) * flux_scale);
     let hops = offline.statistics().map_err(|e| e.to_string())?;

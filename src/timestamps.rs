@@ -89,6 +89,11 @@ impl Timestamps {
         }
     }
 
+    /// How many passes have been timed since times were last taken.
+    pub fn passes(&self) -> usize {
+        self.labels.borrow().len()
+    }
+
     /// Waits for the submitted frame and returns milliseconds per pass label, in order of first use; passes that share
     /// a label are summed. Empties the sink for the next frame.
     ///

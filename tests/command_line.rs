@@ -97,7 +97,8 @@ fn bad_input_gets_one_line_status_two_and_no_file() {
             &["sample:cornell", "--set", "illumination_maps.blend=0"],
             "above 0, at most 1",
         ),
-        (&["sample:cornell", "--budget-ms", "4"], "not available yet"),
+        (&["sample:cornell", "--budget-ms", "0"], "above 0"),
+        (&["sample:cornell", "--budget-ms", "4", "--set", "photons=9"], "chooses"),
     ];
     for (arguments, word) in cases {
         // On a machine without an adapter these two end at the adapter instead.

@@ -82,6 +82,18 @@ impl Clock {
         Ok(())
     }
 
+    /// Milliseconds of the last frame, but for the very first.
+    pub(crate) fn last_ms(&self) -> Option<f64> {
+        self.frames_ms.last().copied()
+    }
+
+    /// Forgets all times: frames are others from now on.
+    pub(crate) fn restart(&mut self) {
+        self.frames_ms.clear();
+        self.stages.clear();
+        self.seen_first = false;
+    }
+
     /// Median, shortest and longest frame in the steady state, milliseconds.
     pub(crate) fn frame_ms(&self) -> [f64; 3] {
         let extreme = |f: fn(f64, f64) -> f64| self.frames_ms.iter().copied().reduce(f).unwrap_or(0.0);

@@ -2,7 +2,7 @@
 
 use super::adapter::Gpu;
 use lightfall::frame::{
-    GiRenderer, IndirectMethod, SceneInputs, Settings, TexelGatherMethod, ViewInputs, ViewResources,
+    ErrorEstimate, GiRenderer, IndirectMethod, SceneInputs, Settings, TexelGatherMethod, ViewInputs, ViewResources,
 };
 use lightfall::pass::{
     Accumulator, AccumulatorInputs, AccumulatorResources, CompositeSettings, HopStatistics, TraceStatistics,
@@ -40,6 +40,8 @@ pub(crate) struct Offline<'a> {
     accumulator: Option<(Accumulator, AccumulatorResources)>,
     /// Whether every frame is taken for one of a scene that changes; not while frames are accumulated.
     pub(crate) in_motion: bool,
+    /// Whether the renderer is told no more of the scene than it has to be.
+    pub(crate) presumes_all: bool,
     /// Whether no frame was rendered so far.
     is_first: bool,
     /// How many pictures' photons of the random sequence are left to others.
@@ -100,6 +102,7 @@ impl<'a> Offline<'a> {
             geometry,
             bvh,
             in_motion: accumulator.is_none(),
+            presumes_all: false,
             is_first: true,
             pictures_before: 0,
             points,
@@ -125,7 +128,11 @@ impl<'a> Offline<'a> {
         let place = |p: &SurfacePoint| p.in_world(&self.scene.instances[p.instance].transform);
         let places: Vec<_> = self.points.iter().map(place).collect();
         self.renderer.set_surface_places(&places);
-        let frame = self.renderer.set_scene(queue, &self.summary, &self.scene.lights)?;
+        let summary = match self.presumes_all {
+            true => self.summary.clone().presuming_all(),
+            false => self.summary.clone(),
+        };
+        let frame = self.renderer.set_scene(queue, &summary, &self.scene.lights)?;
         if self.in_motion {
             self.renderer.geometry_changed();
         }
@@ -265,6 +272,42 @@ impl<'a> Offline<'a> {
             Ok(marked.read_blocking(device, queue)?.len() as f64 / (width * height))
         };
         self.view.marked_pixels().map(share).collect()
+    }
+
+    /// Other settings from the next frame on; the tracer and the method stay.
+    pub(crate) fn set_settings(&mut self, settings: &Settings) -> Result<(), Error> {
+        self.renderer.set_settings(settings)
+    }
+
+    /// How far off a picture of one frame is, told without a truth; `None` where no kernels are, or frames are accumulated.
+    /// Renders two frames and a frame for each of two other pictures; the last frame's picture is another one then.
+    pub(crate) fn estimate_error(&mut self) -> Result<Option<ErrorEstimate>, Error> {
+        let settings = self.renderer.settings().clone();
+        if settings.frames > 1 || settings.indirect_method != IndirectMethod::Splatting {
+            return Ok(None);
+        }
+        let mut pair = |settings: &Settings| {
+            self.set_settings(settings)?;
+            let mut picture = |number| {
+                self.pictures_before = number;
+                self.render_frame(None)?;
+                self.read()
+            };
+            Ok::<_, Error>([picture(0)?, picture(1)?])
+        };
+        let own = pair(&settings)?;
+        let widened = pair(&ErrorEstimate::widened(&settings))?;
+        self.pictures_before = 0;
+        self.set_settings(&settings)?;
+        ErrorEstimate::of([&own[0], &own[1]], [&widened[0], &widened[1]]).map(Some)
+    }
+
+    /// Of accumulated frames, the noise left in their mean: relMSE.
+    pub(crate) fn accumulated_noise(&self) -> Result<Option<f64>, Error> {
+        let noise = |(_, sums): &(Accumulator, AccumulatorResources)| {
+            sums.relative_variance_blocking(&self.gpu.device, &self.gpu.queue)
+        };
+        self.accumulator.as_ref().map(noise).transpose()
     }
 
     /// Bytes of GPU memory, by resource.

@@ -8,7 +8,7 @@ use crate::common::reference::Reference;
 use crate::common::truth_file;
 use crate::rows::{Key, Row};
 use crate::sweep::Point;
-use lightfall::frame::{ErrorEstimate, IndirectMethod, Settings};
+use lightfall::frame::Settings;
 use lightfall::pass::HopStatistics;
 use lightfall::reference::metrics::{self, Image, Truth};
 use lightfall::reference::{PathComponent, PathTracerSettings};
@@ -65,18 +65,21 @@ impl<'a> Subject<'a> {
 
     pub(crate) fn measure(&mut self, point: &Point) -> Result<Row, String> {
         let mut clock = Clock::new(self.gpu);
-        let mut offline = self.offline(point, &point.settings)?;
+        let mut offline = self.offline(point)?;
         for _ in 0..point.settings.frames {
             clock.frame(self.gpu, &mut offline)?;
         }
-        let own = read(&offline)?;
+        let own = offline.read().map_err(|e| e.to_string())?;
         if point.settings.frames == 1 {
             for _ in 0..self.arguments.rounds {
                 clock.frame(self.gpu, &mut offline)?;
             }
         }
         let statistics = offline.statistics().map_err(|e| e.to_string())?;
-        let estimate = self.estimate(point, &mut offline, &own)?;
+        let estimate = match point.is_direct {
+            true => None,
+            false => offline.estimate_error().map_err(|e| e.to_string())?,
+        };
         drop(offline);
         self.gpu.check()?;
         let comparison = metrics::compare(&self.image(own), self.truth(point)?).map_err(|e| e.to_string())?;
@@ -103,40 +106,16 @@ impl<'a> Subject<'a> {
         })
     }
 
-    fn offline(&self, point: &Point, settings: &Settings) -> Result<Offline<'a>, String> {
+    fn offline(&self, point: &Point) -> Result<Offline<'a>, String> {
         let component = match point.is_direct {
             true => Component::Direct,
             false => Component::Indirect,
         };
         let size = [self.arguments.size; 2];
         let mut offline =
-            Offline::new(self.gpu, self.scene.clone(), settings, 0, size, component).map_err(|e| e.to_string())?;
+            Offline::new(self.gpu, self.scene.clone(), &point.settings, 0, size, component).map_err(|e| e.to_string())?;
         offline.stand_still();
         Ok(offline)
-    }
-
-    /// Where a picture is one frame of kernels.
-    fn estimate(
-        &self,
-        point: &Point,
-        offline: &mut Offline<'_>,
-        own: &[[f32; 3]],
-    ) -> Result<Option<ErrorEstimate>, String> {
-        let settings = &point.settings;
-        if point.is_direct || settings.frames > 1 || settings.indirect_method != IndirectMethod::Splatting {
-            return Ok(None);
-        }
-        let render = |offline: &mut Offline<'_>, picture: u32| {
-            offline.pictures_before = picture;
-            offline.render_frame(None).map_err(|e| e.to_string())?;
-            read(offline)
-        };
-        let other = render(offline, 1)?;
-        let mut widened = self.offline(point, &ErrorEstimate::widened(settings))?;
-        let widened = [render(&mut widened, 0)?, render(&mut widened, 1)?];
-        ErrorEstimate::of([own, &other], [&widened[0], &widened[1]])
-            .map(Some)
-            .map_err(|e| e.to_string())
     }
 
     fn image(&self, rgb: Vec<[f32; 3]>) -> Image {
@@ -191,10 +170,6 @@ impl<'a> Subject<'a> {
             ..Truth::new(self.image(estimate.mean))
         })
     }
-}
-
-fn read(offline: &Offline<'_>) -> Result<Vec<[f32; 3]>, String> {
-    offline.read().map_err(|e| e.to_string())
 }
 
 /// Share of the flux that surfaces sent out.

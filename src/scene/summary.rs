@@ -87,6 +87,28 @@ impl SceneSummary {
         Ok(())
     }
 
+    /// Takes for granted what a host cannot tell of its scene: every surface may reflect, every light may have an extent, there may
+    /// be metal and glass anywhere. Nothing is left out then that might be there; `docs/plan.md` says what that costs. What
+    /// shines with geometry stays what it is.
+    #[must_use]
+    pub fn presuming_all(mut self) -> Self {
+        let presumed = || vec!["presumed".to_owned()];
+        self.has_reflecting_surfaces = true;
+        self.lights_with_extent = self.lights - self.environment_lights.min(self.lights);
+        for names in [&mut self.metals, &mut self.dielectrics] {
+            if names.is_empty() {
+                *names = presumed();
+            }
+        }
+        if self.specular_bounds.is_empty() {
+            self.specular_bounds.push(BoundingSphere {
+                center: 0.5 * (self.bounds.min + self.bounds.max),
+                radius: self.bounds.radius(),
+            });
+        }
+        self
+    }
+
     /// Reads it off a scene.
     ///
     /// # Errors
