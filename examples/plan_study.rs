@@ -27,9 +27,9 @@ struct Arguments {
     #[arg(long, default_value_t = 96, value_parser = clap::value_parser!(u32).range(1..=2048))]
     size: u32,
     /// Frames that times are the median of
-    #[arg(long, default_value_t = 5)]
-    frames: usize,
-    /// fast, balanced
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..))]
+    frames: u32,
+    /// fast, balanced, accurate; frames are not accumulated
     #[arg(long, default_value = "fast")]
     preset: String,
     /// Print each plan as well
@@ -49,21 +49,33 @@ fn main() {
 }
 
 fn run(arguments: &Arguments) -> Result<(), String> {
-    let settings = Settings::preset(&arguments.preset)
-        .ok_or_else(|| format!("--preset {:?}: expected fast or balanced", arguments.preset))?;
+    let mut settings = Settings::preset(&arguments.preset)
+        .ok_or_else(|| format!("--preset {:?}: expected fast, balanced or accurate", arguments.preset))?;
+    settings.frames = 1;
     let wishes = Wishes {
         timestamps: true,
         large_buffers: true,
         ..Wishes::default()
     };
     let gpu = Gpu::open(arguments.adapter.as_deref(), wishes)?;
-    println!("{}, preset {}, {} x {} pixels\n", gpu.describe(), arguments.preset, arguments.size, arguments.size);
-    println!("| scene | planned: stages, passes, maps, MiB, ms | presumed: stages, passes, maps, MiB, ms | difference |");
+    println!(
+        "{}, preset {}, {} x {} pixels\n",
+        gpu.describe(),
+        arguments.preset,
+        arguments.size,
+        arguments.size
+    );
+    println!(
+        "| scene | planned: stages, passes, maps, MiB, ms | presumed: stages, passes, maps, MiB, ms | difference |"
+    );
     println!("|---|---|---|---|");
     for (name, scene, stands_still) in scenes() {
         let planned = measure(&gpu, arguments, &settings, &scene, (false, stands_still));
         let presumed = measure(&gpu, arguments, &settings, &scene, (true, false));
-        let (planned, presumed) = (planned.map_err(|e| e.to_string())?, presumed.map_err(|e| e.to_string())?);
+        let (planned, presumed) = (
+            planned.map_err(|e| e.to_string())?,
+            presumed.map_err(|e| e.to_string())?,
+        );
         println!(
             "| {name} | {} | {} | {:.1e} |",
             planned.cell(),
@@ -136,7 +148,7 @@ fn measure(
     let timestamps = Timestamps::new(&gpu.device)?;
     let (mut times, mut passes) = (Vec::new(), Vec::new());
     // All is captured first, and places of environment maps are chosen.
-    for frame in 0..arguments.frames + WARM_UP {
+    for frame in 0..WARM_UP + arguments.frames {
         offline.in_motion = !stands_still;
         if stands_still && frame > 0 {
             offline.renderer.set_changes(&[]);
@@ -161,12 +173,16 @@ fn measure(
 }
 
 /// Frames before those that count.
-const WARM_UP: usize = 12;
+const WARM_UP: u32 = 12;
 
 fn difference(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
     let pairs = || a.as_flattened().iter().zip(b.as_flattened());
     let squares: f64 = pairs().map(|(&a, &b)| f64::from(a - b).powi(2)).sum();
     let mean: f64 = pairs().map(|(&a, _)| f64::from(a)).sum();
     let count = pairs().count().max(1) as f64;
-    if mean > 0.0 { (squares / count).sqrt() / (mean / count) } else { squares.sqrt() }
+    if mean > 0.0 {
+        (squares / count).sqrt() / (mean / count)
+    } else {
+        squares.sqrt()
+    }
 }

@@ -58,10 +58,7 @@ enum Method {
 
 /// Renders a scene with global illumination.
 #[derive(Parser)]
-#[command(
-    args_override_self = true,
-    after_help = "Not available yet: glTF skins."
-)]
+#[command(args_override_self = true, after_help = "Not available yet: glTF skins.")]
 struct Arguments {
     /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, bumpy-floor, plane, furnace, two-rooms, pillars,
     /// penumbra, living-room, colonnade, glass-sphere, ring-occluder, dimpled-mirror, water, courtyard)
@@ -110,7 +107,7 @@ struct Arguments {
     frames: Option<u32>,
     /// Chooses settings instead of a preset, so that a frame takes about so much time: of the GPU, or of a software adapter on
     /// the wall
-    #[arg(long, conflicts_with_all = ["frames", "method"])]
+    #[arg(long, conflicts_with_all = ["preset", "frames", "method"])]
     budget_ms: Option<f64>,
     /// Image to write: .exr (linear radiance) or .png (tone-mapped)
     #[arg(long)]
@@ -272,6 +269,9 @@ fn run_reference(arguments: &Arguments) -> Result<(), String> {
 }
 
 fn reference_settings(arguments: &Arguments) -> Result<PathTracerSettings, String> {
+    if arguments.estimate_error {
+        return Err("--estimate-error: the reference tells its own noise".into());
+    }
     if !arguments.set.is_empty() {
         return Err("--set: the reference has no settings; --bounces, --frames and --component are its options".into());
     }
@@ -367,8 +367,15 @@ fn component(arguments: &Arguments) -> Component {
 
 /// Chooses among the measured ladder of the tracer, with what else the command line asks for.
 fn budget(arguments: &Arguments, ms: f64) -> Result<BudgetController, String> {
-    if arguments.set.iter().any(|pair| pair.trim_start().starts_with("photons=")) {
-        return Err("--set photons: --budget-ms chooses how many".into());
+    let keys = || {
+        arguments
+            .set
+            .iter()
+            .filter_map(|pair| pair.split_once('='))
+            .map(|pair| pair.0.trim())
+    };
+    if let Some(key) = keys().find(|key| ["photons", "frames", "indirect.method"].contains(key)) {
+        return Err(format!("--set {key}: --budget-ms chooses it"));
     }
     let tracer = settings(arguments)?.tracer_kind;
     let mut ladder = Rung::ladder(tracer);
@@ -403,12 +410,17 @@ fn keep_to(
     const SETTLED: usize = 8;
     let mut since = 0;
     for _ in 0..MOST {
-        since = if follow(controller, (gpu, offline), clock)? { 0 } else { since + 1 };
+        since = if follow(controller, (gpu, offline), clock)? {
+            0
+        } else {
+            since + 1
+        };
         if since > SETTLED {
-            break;
+            return Ok(());
         }
     }
-    Ok(())
+    // What is shown is of the last settings.
+    clock.frame(gpu, offline)
 }
 
 fn error_estimate(offline: &mut Offline<'_>) -> Result<Value, String> {
@@ -528,11 +540,7 @@ fn write(gpu: &Gpu, offline: &Offline<'_>, path: &Path, exposure: Option<f32>) -
     picture::write_png((&gpu.device, &gpu.queue), path, offline.radiance(), exposure)
 }
 
-fn report(
-    gpu: &Gpu,
-    offline: &Offline<'_>,
-    (setup_ms, clock): (f64, &Clock),
-) -> Result<Value, String> {
+fn report(gpu: &Gpu, offline: &Offline<'_>, (setup_ms, clock): (f64, &Clock)) -> Result<Value, String> {
     let settings = offline.renderer.settings();
     let flux_scale = offline.renderer.frame().map_or(1.0, |f| f.flux_scale());
     let watts = |flux: [f32; 3]| flux.map(|v| f64::from(v) * flux_scale);

@@ -350,7 +350,7 @@ fn twins() -> Vec<Twin> {
             output_scale, direct_weight, indirect_weight, caustic_weight, emission_weight, diffuse_weight, has_specular,
         }),
         twin!(wgsl::FUSED_COMPOSITE, "Counts", fused_composite::gpu::Counts { lights, layers, shadow_map_size }),
-        twin!(wgsl::ACCUMULATOR, "Params", accumulator::gpu::Params { frames, mean_weight }),
+        twin!(wgsl::ACCUMULATOR, "Params", accumulator::gpu::Params { history_weight, mean_weight }),
         twin!(wgsl::TONE_MAP, "Params", tone_map::gpu::Params { exposure, curve, inverse_gamma }),
         twin!(wgsl::ENV_MAP_SELECTOR, "Params", env_map_selector::gpu::Params {
             candidate_count, columns, limit, tag, back_face_limit, clearance, tolerance, coverage_target,

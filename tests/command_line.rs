@@ -99,6 +99,10 @@ fn bad_input_gets_one_line_status_two_and_no_file() {
         ),
         (&["sample:cornell", "--budget-ms", "0"], "above 0"),
         (&["sample:cornell", "--budget-ms", "4", "--set", "photons=9"], "chooses"),
+        (
+            &["sample:cornell", "--budget-ms", "4", "--preset", "fast"],
+            "cannot be used with",
+        ),
     ];
     for (arguments, word) in cases {
         // On a machine without an adapter these two end at the adapter instead.

@@ -1146,36 +1146,21 @@ fn an_accumulation_begins_anew_by_itself() {
 fn the_accumulator_tells_how_noisy_its_mean_is() {
     let Some(gpu) = gpu() else { return };
     let (device, queue) = (&gpu.device, &gpu.queue);
-    // A power of two that would overflow if it were squared.
+    // Powers of two that would overflow, or vanish, if they were squared.
     for scale in [1.0, 2f64.powi(80), 2f64.powi(-80)] {
         let radiance = Radiance::new(device, [5, 3]).unwrap();
         let (pass, mut resources) = (
             Accumulator::new(device),
             AccumulatorResources::new(device, [5, 3]).unwrap(),
         );
-        let frames = [3.0, 5.0, 4.0, 0.0, 6.0, 4.5];
+        let frames = [3.0, 5.0, 4.0, 0.0, 6.0, 4.5, 3.0, 1.0, 7.0];
         for (index, light) in frames.iter().enumerate() {
-            let told = resources.relative_variance_blocking(device, queue).unwrap();
-            assert_eq!(told.is_finite(), index > 1, "after {index}");
+            clear(
+                &gpu,
+                radiance.view(),
+                [light * scale, 2.0 * light * scale, 0.0, (index % 2) as f64],
+            );
             let mut encoder = device.create_command_encoder(&Default::default());
-            let light = light * scale;
-            encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: radiance.view(),
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color {
-                            r: light,
-                            g: 2.0 * light,
-                            b: 0.0,
-                            a: 1.0,
-                        }),
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
-                ..Default::default()
-            });
             let inputs = AccumulatorInputs {
                 queue,
                 radiance: &radiance,
@@ -1183,18 +1168,55 @@ fn the_accumulator_tells_how_noisy_its_mean_is() {
             };
             pass.record(&mut encoder, &mut resources, &inputs);
             queue.submit([encoder.finish()]);
+            let told = resources.relative_variance_blocking(device, queue).unwrap();
+            let all = &frames[..=index];
+            let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+            if index == 0 {
+                assert_eq!(told, f64::INFINITY);
+            } else {
+                // The first 1, 2, 2, 4, ... of 2, 3, 4, 5, ... frames, and the others.
+                let (first, others) = all.split_at(1 << index.ilog2());
+                let apart = (mean(first) - mean(others)).powi(2);
+                let variance = apart * (first.len() * others.len()) as f64 / (all.len() as f64).powi(2);
+                // Red and green relate to the guard as light does to a hundredth of a third of 1 + 2 of it; blue is black.
+                let of = |share: f64| share * share / (share * share + 1e-4);
+                let exact = variance / mean(all).powi(2) * (of(1.0) + of(2.0)) / 3.0;
+                assert!(
+                    (told - exact).abs() <= 1e-5 * exact + 1e-12,
+                    "{index}, {scale:e}: {told} {exact}"
+                );
+            }
+            let shown = read_rgba32float_blocking(device, queue, resources.mean().view().texture()).unwrap()[7];
+            let coverage = (all.len() / 2) as f64 / all.len() as f64;
+            let wanted = [mean(all) * scale, 2.0 * mean(all) * scale, 0.0, coverage];
+            assert!(
+                shown
+                    .iter()
+                    .zip(wanted)
+                    .all(|(&a, b)| (f64::from(a) - b).abs() <= 1e-6 * b),
+                "{shown:?}"
+            );
         }
-        let count = frames.len() as f64;
-        let mean = frames.iter().sum::<f64>() / count;
-        let spread: f64 = frames.iter().map(|x| (x - mean).powi(2)).sum();
-        let exact = spread / (count * (count - 1.0) * mean * mean) / (1.0 + 1e-4);
-        let told = resources.relative_variance_blocking(device, queue).unwrap();
-        assert!((told / exact - 1.0).abs() < 1e-5, "scale {scale:e}: {told} {exact}");
-        let last = read_rgba32float_blocking(device, queue, resources.mean().view().texture()).unwrap()[7];
-        let shown = [mean * scale, 2.0 * mean * scale, 0.0, 1.0];
-        assert!(last.iter().zip(shown).all(|(&a, b)| (f64::from(a) - b).abs() <= 1e-6 * b), "{last:?}");
     }
     assert_no_errors(&gpu);
+}
+
+/// Fills an image with a colour.
+fn clear(gpu: &Gpu, view: &wgpu::TextureView, [r, g, b, a]: [f64; 4]) {
+    let mut encoder = gpu.device.create_command_encoder(&Default::default());
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a }),
+                store: wgpu::StoreOp::Store,
+            },
+        })],
+        ..Default::default()
+    });
+    gpu.queue.submit([encoder.finish()]);
 }
 
 #[test]
@@ -1210,7 +1232,9 @@ fn other_settings_are_as_those_of_a_new_renderer() {
             tracer_kind: TracerKind::Bvh,
             ..Settings::fast()
         };
-        changes.iter().for_each(|(key, value)| settings.set(key, value).unwrap());
+        changes
+            .iter()
+            .for_each(|(key, value)| settings.set(key, value).unwrap());
         settings
     };
     let all = [
@@ -1220,14 +1244,35 @@ fn other_settings_are_as_those_of_a_new_renderer() {
         with(&[("splatter.shape", "quads"), ("photons", "2000")]),
         with(&[("photons", "0")]),
         with(&[("upsampler.levels", "by-levels"), ("composite.fused", "on")]),
+        with(&[
+            ("bounces", "0"),
+            ("indirect.method", "surface-lights"),
+            ("surface_lights.filter_radius", "0"),
+        ]),
+        with(&[
+            ("bounces", "2"),
+            ("indirect.method", "surface-lights"),
+            ("surface_lights.filter_radius", "0"),
+        ]),
+        with(&[("selective", "on")]),
+        with(&[
+            ("selective", "on"),
+            ("photons", "2000"),
+            ("emission.first_hits", "traced"),
+        ]),
     ];
     let mut kept = Offline::new(&gpu, scene.clone(), &all[0], 0, [48, 32], Component::All).unwrap();
     for settings in all.iter().chain(&all[..2]) {
+        let mut fresh = Offline::new(&gpu, scene.clone(), settings, 0, [48, 32], Component::All).unwrap();
+        kept.points = fresh.points.clone();
+        fresh.render_frame(None).unwrap();
         kept.renderer.set_settings(settings).unwrap();
         kept.render_frame(None).unwrap();
-        let mut fresh = Offline::new(&gpu, scene.clone(), settings, 0, [48, 32], Component::All).unwrap();
-        fresh.render_frame(None).unwrap();
-        assert!(kept.read().unwrap() == fresh.read().unwrap(), "{:?}", settings.entries());
+        assert!(
+            kept.read().unwrap() == fresh.read().unwrap(),
+            "{:?}",
+            settings.entries()
+        );
         let bytes = |offline: &Offline<'_>| (offline.renderer.memory_use(), offline.view.memory_use());
         assert_eq!(bytes(&kept), bytes(&fresh));
     }

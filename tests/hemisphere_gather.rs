@@ -387,7 +387,8 @@ fn what_changed_once_is_drawn_once() {
         // What is gathered is written over it.
         let unwritten = vec![[-1.0_f32; 4]; draws.len()];
         let map = offline.renderer.illumination_map().unwrap();
-        gpu.queue.write_buffer(map.gathered(), 0, bytemuck::cast_slice(&unwritten));
+        gpu.queue
+            .write_buffer(map.gathered(), 0, bytemuck::cast_slice(&unwritten));
         offline.render_frame(None).unwrap();
         were_due = were_due.max(waiting(&gpu, &offline));
         let light = texels(&gpu, &offline);
@@ -399,7 +400,11 @@ fn what_changed_once_is_drawn_once() {
         assert!(frames < 200, "it comes to rest");
     }
     let of = |count: i32| draws.iter().filter(|&&d| d == count).count();
-    println!("{were_due} due, drawn once {}, never {}, at most {most} a frame", of(1), of(0));
+    println!(
+        "{were_due} due, drawn once {}, never {}, at most {most} a frame",
+        of(1),
+        of(0)
+    );
     assert!(of(1) == were_due && of(0) + of(1) == draws.len());
     assert!(were_due > 200 && most == 60);
     assert_no_errors(&gpu);

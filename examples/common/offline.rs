@@ -153,7 +153,10 @@ impl<'a> Offline<'a> {
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         let geometry: &dyn Geometry = &self.geometry;
         let settings = self.renderer.settings();
-        let frames_before = self.pictures_before.wrapping_mul(settings.frames).wrapping_add(accumulated);
+        let frames_before = self
+            .pictures_before
+            .wrapping_mul(settings.frames)
+            .wrapping_add(accumulated);
         let sample_offset = frames_before.wrapping_mul(settings.photons.max(1));
         let scene_inputs = SceneInputs {
             queue,
@@ -279,13 +282,17 @@ impl<'a> Offline<'a> {
         self.renderer.set_settings(settings)
     }
 
-    /// How far off a picture of one frame is, told without a truth; `None` where no kernels are, or frames are accumulated.
+    /// How far off a picture of one frame is, told without a truth; `None` where no kernels are, frames are
+    /// accumulated, or photons are guided, which depends on frames before.
     /// Renders two frames and a frame for each of two other pictures; the last frame's picture is another one then.
     pub(crate) fn estimate_error(&mut self) -> Result<Option<ErrorEstimate>, Error> {
         let settings = self.renderer.settings().clone();
-        if settings.frames > 1 || settings.indirect_method != IndirectMethod::Splatting {
+        let has_kernels = settings.indirect_method == IndirectMethod::Splatting;
+        if settings.frames > 1 || !has_kernels || settings.guided_photons > 0.0 {
             return Ok(None);
         }
+        // Nothing but photons and kernels may change, environment maps stay where they are.
+        let in_motion = std::mem::replace(&mut self.in_motion, false);
         let mut pair = |settings: &Settings| {
             self.set_settings(settings)?;
             let mut picture = |number| {
@@ -298,6 +305,7 @@ impl<'a> Offline<'a> {
         let own = pair(&settings)?;
         let widened = pair(&ErrorEstimate::widened(&settings))?;
         self.pictures_before = 0;
+        self.in_motion = in_motion;
         self.set_settings(&settings)?;
         ErrorEstimate::of([&own[0], &own[1]], [&widened[0], &widened[1]]).map(Some)
     }

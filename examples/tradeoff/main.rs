@@ -11,9 +11,9 @@
 //! pixel, as passes see it; of pictures that are summed of many frames all over each pixel. Or it comes from a file.
 //!
 //! Written to the folder `--out`: `tradeoff.csv`, a row for each point as soon as it is measured, which is not measured again
-//! on the same adapter unless `--fresh` is given; for each scene `NAME.svg`, error over time with the front drawn and presets
-//! marked; and `tradeoff.md`, the tables that are printed: presets, what a step of each knob costs and gains, and how near
-//! estimates without a truth come. Times are medians of frames, of GPU timestamps where the adapter is a GPU, else on the wall;
+//! on the same adapter unless `--fresh` is given; and of all rows of each scene `NAME.svg`, error over time with the front drawn
+//! and presets marked, and in `tradeoff.md` the tables that are printed: presets, the front, what a step of each knob costs and
+//! gains, and how near estimates without a truth come. Times are medians of frames, of GPU timestamps where the adapter is a GPU, else on the wall;
 //! ratios are of one run where rows are.
 
 #[path = "../common/mod.rs"]
@@ -56,6 +56,9 @@ struct Arguments {
     /// Tracers of the base
     #[arg(long, value_delimiter = ',', default_values = ["image-space", "hybrid", "bvh"])]
     tracers: Vec<String>,
+    /// Presets to measure
+    #[arg(long, value_delimiter = ',', default_values = sweep::PRESETS)]
+    presets: Vec<String>,
     /// Only these knobs, or `preset`
     #[arg(long, value_delimiter = ',')]
     knobs: Vec<String>,
@@ -85,7 +88,10 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     if arguments.truth.is_some() && arguments.scenes.len() > 1 {
         return Err("--truth: expected a single scene".into());
     }
-    let points = sweep::points(&arguments.base, &arguments.tracers, &arguments.knobs)?;
+    let points = sweep::points(arguments)?;
+    if points.is_empty() {
+        return Err("--tracers: none of the knobs has an effect on these".into());
+    }
     let wishes = Wishes {
         timestamps: true,
         large_buffers: true,
@@ -104,20 +110,17 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     let mut text = format!("{}, {} × {} pixels\n", gpu.describe(), arguments.size, arguments.size);
     for (name, scene) in arguments.scenes.iter().zip(scenes) {
         let mut subject = Subject::new(&gpu, arguments, name, scene);
-        let mut own = Vec::new();
         for point in &points {
+            bar.inc(1);
             if !subject.concerns(point) {
                 continue;
             }
             bar.set_message(format!("{name} {}", point.name()));
-            let known = rows.find(&subject.key(point)).filter(|_| !arguments.fresh).cloned();
-            let row = match known {
-                Some(row) => row,
-                None => rows.add(subject.measure(point)?)?,
-            };
-            own.push(row);
-            bar.inc(1);
+            if arguments.fresh || !rows.has(&subject.key(point)) {
+                rows.add(subject.measure(point)?)?;
+            }
         }
+        let own = rows.of_scene(&subject.key(&points[0]));
         plot::draw(&arguments.out.join(format!("{}.svg", stem(name))), name, &own)?;
         text += &tables::of_scene(name, &own);
     }

@@ -14,6 +14,9 @@ use lightfall::reference::metrics::{self, Image, Truth};
 use lightfall::reference::{PathComponent, PathTracerSettings};
 use lightfall::scene::{Scene, SceneSummary};
 
+/// Errors below it are noise of the truth.
+const LEAST_ERROR: f64 = 1e-6;
+
 /// A scene, and its truths as they come to be needed.
 pub(crate) struct Subject<'a> {
     gpu: &'a Gpu,
@@ -54,7 +57,10 @@ impl<'a> Subject<'a> {
             adapter: self.gpu.info.name.clone(),
             scene: self.name.into(),
             size: arguments.size,
-            samples: if arguments.truth.is_some() { 0 } else { arguments.samples },
+            truth: match &arguments.truth {
+                Some(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+                None => format!("{} paths", arguments.samples),
+            },
             component: if point.is_direct { "direct" } else { "indirect" }.into(),
             base: point.base.clone(),
             tracer: point.tracer.clone(),
@@ -91,14 +97,15 @@ impl<'a> Subject<'a> {
             adapter: key.adapter,
             scene: key.scene,
             size: key.size,
-            samples: key.samples,
+            truth: key.truth,
             component: key.component,
             base: key.base,
             tracer: key.tracer,
             knob: key.knob,
             value: key.value,
             ms: clock.frame_ms()[0] * f64::from(point.settings.frames),
-            relmse: comparison.relmse,
+            // The truth's own noise, taken out, may leave less than nothing.
+            relmse: comparison.relmse.max(LEAST_ERROR),
             bias: comparison.bias,
             noise: estimate.map(|e| e.noise),
             blur: estimate.map(|e| e.blur),
@@ -112,8 +119,8 @@ impl<'a> Subject<'a> {
             false => Component::Indirect,
         };
         let size = [self.arguments.size; 2];
-        let mut offline =
-            Offline::new(self.gpu, self.scene.clone(), &point.settings, 0, size, component).map_err(|e| e.to_string())?;
+        let mut offline = Offline::new(self.gpu, self.scene.clone(), &point.settings, 0, size, component)
+            .map_err(|e| e.to_string())?;
         offline.stand_still();
         Ok(offline)
     }
@@ -140,7 +147,9 @@ impl<'a> Subject<'a> {
             Some(path) => {
                 let truth = truth_file::read_truth(path)?;
                 let factor = truth.image.width / self.arguments.size;
-                truth.downsampled(factor.max(1)).map_err(|e| format!("{}: {e}", path.display()))?
+                truth
+                    .downsampled(factor.max(1))
+                    .map_err(|e| format!("{}: {e}", path.display()))?
             }
             None => self.traced(kind)?,
         };
@@ -159,8 +168,7 @@ impl<'a> Subject<'a> {
             ..Default::default()
         };
         let size = [self.arguments.size; 2];
-        let mut reference =
-            Reference::new(self.gpu, self.scene.clone(), &paths, 0, size).map_err(|e| e.to_string())?;
+        let mut reference = Reference::new(self.gpu, self.scene.clone(), &paths, 0, size).map_err(|e| e.to_string())?;
         for _ in 0..self.arguments.samples {
             reference.render_sample(None).map_err(|e| e.to_string())?;
         }
@@ -174,9 +182,11 @@ impl<'a> Subject<'a> {
 
 /// Share of the flux that surfaces sent out.
 fn unconfirmed(hops: &[HopStatistics]) -> f64 {
-    let sum = |of: fn(&HopStatistics) -> [f32; 3]| -> f64 {
-        hops.iter().skip(1).flat_map(of).map(f64::from).sum()
-    };
+    let sum = |of: fn(&HopStatistics) -> [f32; 3]| -> f64 { hops.iter().skip(1).flat_map(of).map(f64::from).sum() };
     let emitted = sum(|h| h.emitted);
-    if emitted > 0.0 { (sum(|h| h.lost) + sum(|h| h.tentative)) / emitted } else { 0.0 }
+    if emitted > 0.0 {
+        (sum(|h| h.lost) + sum(|h| h.tentative)) / emitted
+    } else {
+        0.0
+    }
 }

@@ -22,7 +22,7 @@ pub(crate) fn draw(path: &Path, name: &str, rows: &[Row]) -> Result<(), String> 
 }
 
 fn try_draw(path: &Path, name: &str, rows: &[&Row]) -> Result<(), Box<dyn std::error::Error>> {
-    let at = |row: &Row| (row.ms, row.relmse.max(1e-6));
+    let at = |row: &Row| (row.ms, row.relmse);
     let range = |of: fn((f64, f64)) -> f64| {
         let values = || rows.iter().map(|row| of(at(row)));
         let (low, high) = (values().fold(f64::MAX, f64::min), values().fold(0.0, f64::max));
@@ -56,7 +56,11 @@ fn try_draw(path: &Path, name: &str, rows: &[&Row]) -> Result<(), Box<dyn std::e
         chart.draw_series(presets.map(|row| {
             EmptyElement::at(at(row))
                 + TriangleMarker::new((0, 0), 7, color.filled())
-                + Text::new(row.value.clone(), (8, -14), ("sans-serif", 13).into_font().color(&color))
+                + Text::new(
+                    row.value.clone(),
+                    (8, -14),
+                    ("sans-serif", 13).into_font().color(&color),
+                )
         }))?;
     }
     chart

@@ -10,8 +10,8 @@ pub(crate) struct Key {
     pub(crate) adapter: String,
     pub(crate) scene: String,
     pub(crate) size: u32,
-    /// Paths of each pixel of the truth; 0: from a file.
-    pub(crate) samples: u32,
+    /// A file, or paths of each pixel.
+    pub(crate) truth: String,
     pub(crate) component: String,
     pub(crate) base: String,
     pub(crate) tracer: String,
@@ -25,7 +25,7 @@ pub(crate) struct Row {
     pub(crate) adapter: String,
     pub(crate) scene: String,
     pub(crate) size: u32,
-    pub(crate) samples: u32,
+    pub(crate) truth: String,
     pub(crate) component: String,
     pub(crate) base: String,
     pub(crate) tracer: String,
@@ -50,7 +50,7 @@ impl Row {
             adapter: row.adapter,
             scene: row.scene,
             size: row.size,
-            samples: row.samples,
+            truth: row.truth,
             component: row.component,
             base: row.base,
             tracer: row.tracer,
@@ -82,13 +82,24 @@ impl Rows {
         })
     }
 
-    /// The last one.
-    pub(crate) fn find(&self, key: &Key) -> Option<&Row> {
-        self.rows.iter().rev().find(|row| row.key() == *key)
+    pub(crate) fn has(&self, key: &Key) -> bool {
+        self.rows.iter().any(|row| row.key() == *key)
+    }
+
+    /// All of the scene that a key is of, as large and compared with the same truth; of rows of the same point the last one.
+    pub(crate) fn of_scene(&self, key: &Key) -> Vec<Row> {
+        let is_of = |own: &Key| {
+            (&own.adapter, &own.scene, own.size, &own.truth) == (&key.adapter, &key.scene, key.size, &key.truth)
+        };
+        let keys: Vec<Key> = self.rows.iter().map(Row::key).collect();
+        let is_last = |index: usize| !keys[index + 1..].contains(&keys[index]);
+        let indexed = self.rows.iter().enumerate();
+        let kept = indexed.filter(|(index, _)| is_of(&keys[*index]) && is_last(*index));
+        kept.map(|(_, row)| row.clone()).collect()
     }
 
     /// Appends a row, in the file too.
-    pub(crate) fn add(&mut self, row: Row) -> Result<Row, String> {
+    pub(crate) fn add(&mut self, row: Row) -> Result<(), String> {
         let at = |e: String| format!("{}: {e}", self.path.display());
         let file = OpenOptions::new().create(true).append(true).open(&self.path);
         let file = file.map_err(|e| at(e.to_string()))?;
@@ -97,7 +108,7 @@ impl Rows {
             .from_writer(file);
         writer.serialize(&row).map_err(|e| at(e.to_string()))?;
         writer.flush().map_err(|e| at(e.to_string()))?;
-        self.rows.push(row.clone());
-        Ok(row)
+        self.rows.push(row);
+        Ok(())
     }
 }

@@ -1,5 +1,6 @@
 //! Which settings are measured.
 
+use crate::Arguments;
 use lightfall::frame::Settings;
 
 /// The knob that is a preset.
@@ -22,7 +23,11 @@ enum Concern {
 
 /// Name of a knob, what it has an effect on, and its values, each of which costs more than the one before, or has no order.
 const KNOBS: [(&str, Concern, &[&str]); 21] = [
-    ("photons", Concern::Any, &["15000", "30000", "60000", "120000", "240000", "480000"]),
+    (
+        "photons",
+        Concern::Any,
+        &["15000", "30000", "60000", "120000", "240000", "480000"],
+    ),
     ("bounces", Concern::Any, &["1", "2", "3"]),
     ("splatter.photons", Concern::Any, &["50", "100", "200", "400", "800"]),
     ("splatter.subsampling", Concern::Any, &["8", "4", "2", "1"]),
@@ -37,7 +42,15 @@ const KNOBS: [(&str, Concern, &[&str]); 21] = [
     (
         "tracer.method",
         Concern::EnvMaps,
-        &["paper", "plane", "nearest-march", "ordered-march", "nearest-walk", "ordered-walk", "verified-walk"],
+        &[
+            "paper",
+            "plane",
+            "nearest-march",
+            "ordered-march",
+            "nearest-walk",
+            "ordered-walk",
+            "verified-walk",
+        ],
     ),
     ("tracer.iterations", Concern::EnvMaps, &["2", "3", "5", "8"]),
     (
@@ -47,7 +60,11 @@ const KNOBS: [(&str, Concern, &[&str]); 21] = [
     ),
     ("surface_lights.rays", Concern::Triangles, &["8", "32"]),
     ("illumination_maps.texels", Concern::Triangles, &["500", "1000", "2000"]),
-    ("soft_shadow.method", Concern::Shadows, &["hard", "pcf", "pcss", "cross", "disc"]),
+    (
+        "soft_shadow.method",
+        Concern::Shadows,
+        &["hard", "pcf", "pcss", "cross", "disc"],
+    ),
     ("soft_shadow.search_taps", Concern::Shadows, &["1", "2", "4", "8"]),
     ("soft_shadow.blur_taps", Concern::Shadows, &["3", "5", "7", "11"]),
     ("shadow_maps.size", Concern::Shadows, &["128", "256", "512", "1024"]),
@@ -80,7 +97,10 @@ impl Point {
 }
 
 /// Presets with each of the tracers, then the values of all knobs of a preset.
-pub(crate) fn points(base: &str, tracers: &[String], knobs: &[String]) -> Result<Vec<Point>, String> {
+pub(crate) fn points(arguments: &Arguments) -> Result<Vec<Point>, String> {
+    let Arguments {
+        base, tracers, knobs, ..
+    } = arguments;
     let is_wanted = |name: &str| knobs.is_empty() || knobs.iter().any(|k| k == name);
     let known = || KNOBS.iter().map(|k| k.0).chain([PRESET]);
     if let Some(unknown) = knobs.iter().find(|k| known().all(|name| name != k.as_str())) {
@@ -90,7 +110,7 @@ pub(crate) fn points(base: &str, tracers: &[String], knobs: &[String]) -> Result
     let mut points = Vec::new();
     for tracer in tracers {
         if is_wanted(PRESET) {
-            for preset in PRESETS {
+            for preset in &arguments.presets {
                 points.push(point((preset, tracer), (PRESET, preset), false)?);
             }
         }
@@ -112,9 +132,11 @@ pub(crate) fn points(base: &str, tracers: &[String], knobs: &[String]) -> Result
 
 fn point((base, tracer): (&str, &str), (knob, value): (&str, &str), is_direct: bool) -> Result<Point, String> {
     let text = |e: lightfall::Error| e.to_string();
-    let mut settings = Settings::preset(base)
-        .ok_or_else(|| format!("--base {base:?}: expected {}", PRESETS.join(", ")))?;
-    settings.set("tracer.kind", tracer).map_err(|e| format!("--tracers: {e}"))?;
+    let mut settings =
+        Settings::preset(base).ok_or_else(|| format!("preset {base:?}: expected {}", PRESETS.join(", ")))?;
+    settings
+        .set("tracer.kind", tracer)
+        .map_err(|e| format!("--tracers: {e}"))?;
     for (key, value) in implied(knob) {
         settings.set(key, value).map_err(text)?;
     }

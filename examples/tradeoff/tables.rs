@@ -43,7 +43,10 @@ fn presets(text: &mut String, rows: &[&Row]) {
         let best = front.iter().rev().find(|f| f.ms <= row.ms);
         best.map_or(1.0, |best| row.relmse / best.relmse)
     };
-    line!(text, "\n| preset | ms | relMSE | energy bias | error over the front's at its time |\n|---|---|---|---|---|");
+    line!(
+        text,
+        "\n| preset | ms | relMSE | energy bias | error over the front's at its time |\n|---|---|---|---|---|"
+    );
     for row in rows.iter().filter(|r| r.knob == PRESET) {
         line!(
             text,
@@ -59,19 +62,31 @@ fn presets(text: &mut String, rows: &[&Row]) {
 }
 
 fn front_table(text: &mut String, rows: &[&Row]) {
-    line!(text, "\n| on the front | ms | relMSE | energy bias |\n|---|---|---|---|");
+    line!(
+        text,
+        "\n| on the front | ms | relMSE | energy bias |\n|---|---|---|---|"
+    );
     for row in front(rows) {
         let what = match row.knob.as_str() {
             PRESET => format!("{}, {}", row.value, row.tracer),
             knob => format!("{}, {}, {knob}={}", row.base, row.tracer, row.value),
         };
-        line!(text, "| {what} | {:.0} | {:.4} | {:+.2} % |", row.ms, row.relmse, 100.0 * row.bias);
+        line!(
+            text,
+            "| {what} | {:.0} | {:.4} | {:+.2} % |",
+            row.ms,
+            row.relmse,
+            100.0 * row.bias
+        );
     }
 }
 
 /// What each value of each knob costs and gains over the one before.
 fn steps(text: &mut String, rows: &[Row]) {
-    line!(text, "\n| knob | tracer | step | time | error | energy bias |\n|---|---|---|---|---|---|");
+    line!(
+        text,
+        "\n| knob | tracer | step | time | error | energy bias |\n|---|---|---|---|---|---|"
+    );
     for pair in rows.windows(2) {
         let [a, b] = pair else { continue };
         if b.knob == PRESET || (&a.knob, &a.tracer, &a.component) != (&b.knob, &b.tracer, &b.component) {

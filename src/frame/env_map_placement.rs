@@ -110,8 +110,9 @@ impl EnvMapPlacement {
     /// Selects anew, by other settings; so many of the old places stay in use until that arrives.
     pub(super) fn start_over(&mut self, limit: usize) {
         self.ongoing = None;
-        if let Some(centers) = &mut self.centers {
+        if let Some(centers) = self.centers.as_mut().filter(|centers| centers.len() > limit) {
             centers.truncate(limit);
+            self.coverage = None;
         }
     }
 

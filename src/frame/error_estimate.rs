@@ -1,40 +1,41 @@
 //! How far off a picture is, told without a truth: noise from photons of another draw, blur from wider kernels.
 //!
-//! Two pictures of the same settings with photons of their own differ by noise alone; twice the variance of one. Pictures with
-//! kernels of [`WIDENING`] times the width differ from them by blur, and by noise that is another one for each draw: the product
-//! of both differences, one of each draw, is the square of the blur in the mean.
+//! Two pictures of the same settings with photons of their own differ by noise alone, with twice the variance of one. Pictures
+//! whose kernels are wider differ from them by how much more these blur, and by noise that is another one for each draw: the
+//! product of both differences, one of each draw, is the square of the former in the mean.
 
 use super::Settings;
 use crate::Error;
 use crate::pass::Bandwidth;
-
-/// How many times as wide kernels are that blur is told from.
-pub const WIDENING: f32 = 2.0;
+use crate::resource::BLACK_GUARD;
 
 /// Squared blur of a kernel over the squared difference to one of twice its width.
 const BLUR_SHARE: f64 = 1.0;
 
-/// Part of the mean radiance that stands in for the radiance of black pixels, as in
-/// [`metrics`](crate::reference::metrics).
-const BLACK_GUARD: f64 = 0.01;
-
-/// What relMSE ([`metrics`](crate::reference::metrics)) of one picture is made of.
+/// What relMSE (as in `reference::metrics`) of a picture of one frame is made of, all pixels counted. Light that never
+/// arrives is no part of it, for no picture of the same settings has it: bounces that settings leave out, rays that
+/// environment maps lose or that end beside where they should. Nor is blur of kernels that are as wide as they may be
+/// (`splatter.max_radius`) already, and of caustics that have photons of their own.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorEstimate {
     /// Variance: what another draw of photons changes.
     pub noise: f64,
-    /// Squared blur of kernels. Light that never arrives, as bounces that settings leave out or rays that are lost, is no part of
-    /// it: no picture of the same settings has it.
+    /// Squared blur of kernels.
     pub blur: f64,
 }
 
 impl ErrorEstimate {
+    /// How many times as wide kernels are that blur is told from.
+    pub const WIDENING: f32 = 2.0;
+
     /// The settings of the pictures with wider kernels.
     pub fn widened(settings: &Settings) -> Settings {
         let mut widened = settings.clone();
         match &mut widened.splatter.bandwidth {
-            Bandwidth::Density { photons, .. } | Bandwidth::Screen { photons, .. } => *photons *= WIDENING * WIDENING,
-            Bandwidth::Fixed(radius) => *radius *= WIDENING,
+            Bandwidth::Density { photons, .. } | Bandwidth::Screen { photons, .. } => {
+                *photons *= Self::WIDENING * Self::WIDENING;
+            }
+            Bandwidth::Fixed(radius) => *radius *= Self::WIDENING,
         }
         widened
     }
@@ -78,5 +79,63 @@ impl ErrorEstimate {
     /// All of it.
     pub fn relmse(&self) -> f64 {
         self.noise + self.blur
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Even in [-1/2, 1/2), another one for each draw and value (SplitMix64).
+    fn noise(draw: u32, value: usize) -> f32 {
+        let mut bits = (u64::from(draw) << 32 | value as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((bits ^ (bits >> 31)) >> 40) as f32 / (1 << 24) as f32 - 0.5
+    }
+
+    fn picture(draw: u32, blur: f32, spread: f32) -> Vec<[f32; 3]> {
+        let value = |i: usize| 1.0 + blur * (i as f32).sin() + spread * noise(draw, i);
+        (0..40_000)
+            .map(|i| [value(3 * i), value(3 * i + 1), value(3 * i + 2)])
+            .collect()
+    }
+
+    #[test]
+    fn noise_and_blur_are_told_apart() {
+        for (blur, spread) in [(0.0, 0.4), (0.1, 0.0), (0.1, 0.4)] {
+            // Twice the width blurs four times as much, and averages noise over four times the area.
+            let own = [1, 2].map(|draw| picture(draw, blur, spread));
+            let widened = [3, 4].map(|draw| picture(draw, 4.0 * blur, 0.5 * spread));
+            let told = ErrorEstimate::of([&own[0], &own[1]], [&widened[0], &widened[1]]).unwrap();
+            let (noise, apart) = (f64::from(spread).powi(2) / 12.0, (3.0 * f64::from(blur)).powi(2) / 2.0);
+            assert!((told.noise - noise).abs() < 0.05 * noise + 1e-9, "{told:?} {noise}");
+            let wanted = BLUR_SHARE * apart;
+            assert!((told.blur - wanted).abs() < 0.05 * wanted + 2e-4, "{told:?} {wanted}");
+        }
+        let (large, small) = (vec![[1.0; 3]; 4], vec![[1.0; 3]; 3]);
+        let error = ErrorEstimate::of([&large, &small], [&large, &large]).unwrap_err();
+        assert!(
+            matches!(
+                error,
+                Error::CountMismatch {
+                    expected: 4,
+                    found: 3,
+                    ..
+                }
+            ),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn kernels_are_widened() {
+        let mut settings = Settings::fast();
+        settings.set("splatter.photons", "50").unwrap();
+        let widened = ErrorEstimate::widened(&settings).entries();
+        assert!(widened.contains(&("splatter.photons", "200".to_owned())));
+        settings.set("splatter.fixed_radius", "0.05").unwrap();
+        let widened = ErrorEstimate::widened(&settings).entries();
+        assert!(widened.contains(&("splatter.fixed_radius", "0.1".to_owned())));
     }
 }

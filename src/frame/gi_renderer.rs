@@ -235,38 +235,41 @@ impl GiRenderer {
         })
     }
 
-    /// Takes other settings from the next `set_scene` on: what the old ones made and the new ones do not share is dropped, and
-    /// what views hold is made anew when they are recorded. Pipelines stay where none but numbers change that shaders are told
-    /// (photons, bounces, maps, kernels, sub-sampling); so do the places of environment maps, as many as there may be. Photons
-    /// of before are forgotten, kept light too. For a change now and then, as a [`BudgetController`](super::BudgetController)
-    /// asks for, not for every frame.
+    /// Takes other settings. Call it right before `set_scene`, which allocates for them: what the old ones made and the new ones do
+    /// not share is dropped at once, and what views hold is made anew when they are recorded. Pipelines stay unless the tracer,
+    /// a method or the form of splats is another one; so do the places of environment maps, as many as there may be. Photons are
+    /// forgotten, kept light too, and a `PhotonFeeder` of other photons. For a change now and then, as a
+    /// [`BudgetController`](super::BudgetController) asks for, not for every frame.
     ///
     /// # Errors
-    /// As [`GiRenderer::new`]; the old settings stay then.
+    /// As [`GiRenderer::new`]; the old settings stay then. What does not fit the device's limits is an error of `set_scene`.
     pub fn set_settings(&mut self, settings: &Settings) -> Result<(), Error> {
         settings.validate()?;
-        if *settings == self.settings {
+        let old = &self.settings;
+        if settings == old {
             return Ok(());
         }
-        if !settings.share_pipelines(&self.settings) {
+        if !settings.share_pipelines(old) {
             self.passes = Passes::new(&self.device, settings)?;
         }
-        self.direct = None;
-        self.indirect = None;
-        self.photons_frame = None;
-        self.selection = None;
-        self.recapture.forget();
-        self.guiding = GuidingSchedule::default();
-        if settings.environment_suns != self.settings.environment_suns {
-            self.stand_ins.environment_changed();
+        let shadows = |s: &Settings| (s.shadow_map_size, s.selects_photons());
+        if shadows(settings) != shadows(old) {
+            self.direct = None;
         }
-        let selects_alike = |a: &Settings, b: &Settings| {
-            (a.selector, a.env_map_count, a.env_map_size) == (b.selector, b.env_map_count, b.env_map_size)
-        };
-        if !selects_alike(settings, &self.settings) {
+        self.indirect = None;
+        self.selection = None;
+        self.guiding = GuidingSchedule::default();
+        if (settings.selector, settings.env_map_count) != (old.selector, old.env_map_count) {
             self.placement.start_over(settings.env_map_count as usize);
         }
-        self.streamed = settings.traced_photons();
+        let streams = |s: &Settings| (s.indirect_method, s.traced_photons(), s.walked_bounces());
+        if streams(settings) != streams(old) {
+            self.streamed = settings.traced_photons();
+            #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
+            {
+                self.photon_feeder = None;
+            }
+        }
         self.settings = settings.clone();
         self.generation = next_generation();
         self.revision += 1;
@@ -1104,7 +1107,7 @@ impl GiRenderer {
         hasher.finish()
     }
 
-    /// The settings it was made with.
+    /// The settings it was made with, or was given last.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }

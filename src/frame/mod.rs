@@ -29,7 +29,7 @@ mod surface_light_view;
 mod traced_photons;
 
 pub use budget::{Budget, BudgetController, Rung};
-pub use error_estimate::{ErrorEstimate, WIDENING};
+pub use error_estimate::ErrorEstimate;
 pub use gi_renderer::{GiRenderer, SceneInputs, ViewInputs, ViewResources};
 #[cfg(all(feature = "bvh", not(target_arch = "wasm32")))]
 pub use photon_feeder::PhotonFeeder;

@@ -579,28 +579,23 @@ impl Settings {
         }
     }
 
-    /// Whether the passes of one serve the other: only numbers differ that shaders are told, or that buffers and images are made
-    /// by.
+    /// Whether the passes of one serve the other: only what buffers and images are made by differs, and what shaders are told.
     pub(super) fn share_pipelines(&self, other: &Self) -> bool {
-        let like_other = Self {
-            frames: other.frames,
-            photons: other.photons,
-            bounces: other.bounces,
-            env_map_count: other.env_map_count,
-            env_maps_at_lights: other.env_maps_at_lights,
-            env_map_size: other.env_map_size,
-            environment_suns: other.environment_suns,
-            shadow_map_size: other.shadow_map_size,
-            selector: other.selector,
-            splatter: other.splatter,
-            radius_alpha: other.radius_alpha,
-            subsampling: other.subsampling,
-            specular_paths: other.specular_paths,
-            specular_surfaces: other.specular_surfaces,
-            ..self.clone()
+        let ways = |s: &Self| {
+            (
+                s.tracer_kind,
+                s.trace_method,
+                s.indirect_method,
+                s.caustic.method,
+                s.glossy_method,
+                s.fuses_composite,
+            )
         };
-        // Without photons there is no selection among them.
-        like_other == *other && self.selects_photons() == other.selects_photons()
+        let wants = |s: &Self| {
+            let is_guided = s.guided_photons > 0.0;
+            [s.selects_photons(), s.filters(), s.gathers_by_draws(), is_guided]
+        };
+        ways(self) == ways(other) && wants(self) == wants(other) && self.splatter_config == other.splatter_config
     }
 
     /// Whether photons stay that nothing has changed for.

@@ -2,12 +2,12 @@
 //!
 //! Input: [`Radiance`] of a frame. Output: the mean so far, in which each of n frames weighs 1/n; it begins anew when what it
 //! shows changes ([`AccumulatorResources::follow`]); and how noisy that still is
-//! ([`AccumulatorResources::relative_variance_blocking`]). Cost: one full-screen pass and three textures. Limits: blur of the
+//! ([`AccumulatorResources::relative_variance_blocking`]). Cost: one full-screen pass and four textures. Limits: blur of the
 //! density estimate falls only as far as its kernels narrow with the frames ([`progressive_scale`](super::progressive_scale)).
 
 use super::full_screen::{FullScreen, FullScreenResources};
 use crate::gpu::{self as device, Slot};
-use crate::resource::Radiance;
+use crate::resource::{BLACK_GUARD, Radiance};
 use crate::{Error, Timestamps, read_rgba32float_blocking, wgsl};
 
 pub(crate) mod gpu {
@@ -17,16 +17,13 @@ pub(crate) mod gpu {
     #[derive(Clone, Copy, Pod, Zeroable)]
     #[repr(C)]
     pub(crate) struct Params {
-        pub(crate) frames: f32,
+        pub(crate) history_weight: f32,
         pub(crate) mean_weight: f32,
     }
 }
 
 /// Bindings of `shaders/pass/accumulator.wgsl`, in order.
 pub(crate) const SLOTS: [Slot; 3] = [Slot::Uniform, Slot::Texture, Slot::Texture];
-
-/// Part of the mean radiance that stands in for the radiance of black pixels, as in [`metrics`](crate::reference::metrics).
-const BLACK_GUARD: f64 = 0.01;
 
 /// The pass.
 #[derive(Debug)]
@@ -39,6 +36,8 @@ pub struct Accumulator {
 pub struct AccumulatorResources {
     inner: FullScreenResources,
     sums: [wgpu::TextureView; 2],
+    /// The sum as it was when the number of its frames was last a power of two below the present one.
+    part: wgpu::TextureView,
     mean: Radiance,
     frames: u32,
     /// What they show.
@@ -86,9 +85,13 @@ impl Accumulator {
             _ => (&resources.sums[1], &resources.sums[0]),
         };
         let params = gpu::Params {
-            frames: resources.frames as f32,
+            history_weight: if resources.frames == 0 { 0.0 } else { 1.0 },
             mean_weight: 1.0 / (resources.frames + 1) as f32,
         };
+        if resources.frames.is_power_of_two() {
+            let (sum, part) = (history.texture(), resources.part.texture());
+            encoder.copy_texture_to_texture(sum.as_image_copy(), part.as_image_copy(), sum.size());
+        }
         resources.frames += 1;
         inputs
             .queue
@@ -112,15 +115,16 @@ impl AccumulatorResources {
             size,
             layers: 1,
             format: Accumulator::FORMAT,
-            usage: U::RENDER_ATTACHMENT | U::TEXTURE_BINDING | U::COPY_SRC,
+            usage: U::RENDER_ATTACHMENT | U::TEXTURE_BINDING | U::COPY_SRC | U::COPY_DST,
         };
         let view = || Ok::<_, Error>(device::texture(device, &spec)?.create_view(&Default::default()));
         let inner = FullScreenResources::new::<gpu::Params>(device, "lightfall::Accumulator::params")?;
         let mean = Radiance::new(device, size)?;
         Ok(Self {
-            bytes: 2 * spec.bytes() + mean.memory_use() + inner.params.size(),
+            bytes: 3 * spec.bytes() + mean.memory_use() + inner.params.size(),
             inner,
             sums: [view()?, view()?],
+            part: view()?,
             mean,
             frames: 0,
             subject: None,
@@ -152,10 +156,10 @@ impl AccumulatorResources {
         &self.mean
     }
 
-    /// The noise left in the mean, told by how far frames spread: relMSE ([`metrics`](crate::reference::metrics)) that is
-    /// variance, of the sum of the channels; infinite with fewer than two frames. Photons of one sequence are spread more evenly
-    /// over many frames than by chance, so that the mean is nearer to the truth than this says; blur, which all frames share, is
-    /// no part of it. Submits and waits.
+    /// The noise left in the mean, told by how far the mean of the first frames, some power of two and at least half of them, is
+    /// from that of the others: relMSE as in `reference::metrics` of all pixels, as far as it is variance; infinite with fewer
+    /// than two frames. Where the camera is jittered, what that changes at edges counts; blur, which all frames share, does
+    /// not. Submits and waits.
     ///
     /// # Errors
     /// [`Error::ReadBack`], [`Error::LimitExceeded`].
@@ -163,17 +167,26 @@ impl AccumulatorResources {
         if self.frames < 2 {
             return Ok(f64::INFINITY);
         }
-        let last = self.sums[(self.frames as usize - 1) % 2].texture();
-        let texels = read_rgba32float_blocking(device, queue, last)?;
+        let all = self.sums[(self.frames as usize - 1) % 2].texture();
+        let [all, part] = [all, self.part.texture()].map(|sum| read_rgba32float_blocking(device, queue, sum));
+        let (all, part) = (all?, part?);
+        // The largest power of two below.
+        let first = f64::from(1 << (self.frames - 1).ilog2());
         let frames = f64::from(self.frames);
-        let light = |texel: &[f32; 4]| texel[..3].iter().map(|&v| f64::from(v)).sum::<f64>() / frames;
-        let count = texels.len().max(1) as f64;
-        let guard = BLACK_GUARD * texels.iter().map(light).sum::<f64>() / count;
-        let of_pixel = |texel: &[f32; 4]| {
-            let (squared, variance) = (light(texel).powi(2), f64::from(texel[3]) / (frames * (frames - 1.0)));
-            if squared > 0.0 { variance * squared / (squared + guard * guard) } else { 0.0 }
+        let pairs = || {
+            let channels = |(all, part): (&[f32; 4], &[f32; 4])| [0, 1, 2].map(|c| [all[c], part[c]].map(f64::from));
+            all.iter().zip(&part).flat_map(move |pair| channels(pair))
         };
-        Ok(texels.iter().map(of_pixel).sum::<f64>() / count)
+        let count = pairs().count().max(1) as f64;
+        let guard = BLACK_GUARD * pairs().map(|[all, _]| all / frames).sum::<f64>() / count;
+        let relative = |[all, part]: [f64; 2]| {
+            let (mean, apart) = (all / frames, part / first - (all - part) / (frames - first));
+            let scale = mean * mean + guard * guard;
+            // Of the means of two parts, each with the variance of a frame over its frames.
+            let variance = apart * apart * first * (frames - first) / (frames * frames);
+            if scale > 0.0 { variance / scale } else { 0.0 }
+        };
+        Ok(pairs().map(relative).sum::<f64>() / count)
     }
 
     /// Bytes allocated.

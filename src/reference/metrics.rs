@@ -21,9 +21,8 @@
 //! One NaN or infinity anywhere in the image fails everything: [`Comparison::finite`] is false, all errors are NaN.
 
 use crate::Error;
+use crate::resource::BLACK_GUARD;
 
-/// Part of the mean radiance that stands in for the radiance of black pixels in relative errors.
-const BLACK_GUARD: f64 = 0.01;
 /// Depth step between neighbours, relative to the nearer one, above which they lie on different surfaces. A plane seen
 /// at up to 80° from its normal stays below it at 256 pixels and a field of view of 60°: tan 80° · 1.15 / 256 = 0.026.
 const DEPTH_EDGE: f64 = 0.03;

@@ -12,7 +12,7 @@
 use super::emitters::Emitters;
 use crate::gpu::{self as device, BindGroupCache, ComputeSpec, RenderSpec, Slot};
 use crate::resource::bvh_geometry::BVH_SLOTS;
-use crate::resource::{BvhGeometry, Radiance};
+use crate::resource::{BLACK_GUARD, BvhGeometry, Radiance};
 use crate::scene::{Camera, Projection, UnitFrame};
 use crate::{Error, Timestamps, read_back, wgsl};
 use glam::DVec3;
@@ -85,7 +85,8 @@ pub struct PathTracerSettings {
     pub bounces: u32,
     /// Scatterings before Russian roulette may end a path. Fewer are faster and noisier.
     pub roulette_from: u32,
-    /// Whether paths begin all over a pixel, as a box filter does; else all go through its middle, which is what passes see of it.
+    /// Whether paths begin all over a pixel, as a box filter does; else all go through its middle, which is what passes see
+    /// of it.
     pub spans_pixel: bool,
 }
 
@@ -163,7 +164,7 @@ impl PathEstimate {
     pub fn relative_variance(&self) -> f64 {
         let values = || self.mean.iter().flatten().map(|&x| f64::from(x));
         let count = values().count().max(1) as f64;
-        let guard = 0.01 * values().sum::<f64>() / count;
+        let guard = BLACK_GUARD * values().sum::<f64>() / count;
         let errors = self.standard_error.iter().flatten().map(|&e| f64::from(e).powi(2));
         let relative = values().zip(errors).map(|(r, variance)| {
             let scale = r * r + guard * guard;

@@ -67,6 +67,7 @@ pub use photon_groups::PhotonGroups;
 pub use photon_pool::PhotonPool;
 pub use photon_targets::PhotonTargets;
 pub use photons::{PHOTON_BYTES, Photon, PhotonMap, PhotonState, Photons};
+pub(crate) use radiance::BLACK_GUARD;
 pub use radiance::Radiance;
 pub use rays::{Ray, RayHit, RayList, Rays};
 pub use shadow_maps::ShadowMaps;

@@ -2,6 +2,9 @@
 
 use crate::{Error, gpu};
 
+/// Part of the mean radiance that stands in for the radiance of black pixels in relative errors.
+pub(crate) const BLACK_GUARD: f64 = 0.01;
+
 /// Outgoing radiance, W/m²/sr in world units (times the host's pre-exposure), linear RGB; alpha is 1 where a surface is
 /// seen. Any colour format that can be rendered to; `rgba32float` holds every scene unscaled.
 #[derive(Debug)]

@@ -87,8 +87,8 @@ impl SceneSummary {
         Ok(())
     }
 
-    /// Takes for granted what a host cannot tell of its scene: every surface may reflect, every light may have an extent, there may
-    /// be metal and glass anywhere. Nothing is left out then that might be there; `docs/plan.md` says what that costs. What
+    /// Takes for granted what a host cannot tell of its scene: every surface may reflect, every light may have an extent, there
+    /// may be metal and glass anywhere. Nothing is left out then that might be there; `docs/plan.md` says what that costs. What
     /// shines with geometry stays what it is.
     #[must_use]
     pub fn presuming_all(mut self) -> Self {
@@ -100,12 +100,10 @@ impl SceneSummary {
                 *names = presumed();
             }
         }
-        if self.specular_bounds.is_empty() {
-            self.specular_bounds.push(BoundingSphere {
-                center: 0.5 * (self.bounds.min + self.bounds.max),
-                radius: self.bounds.radius(),
-            });
-        }
+        self.specular_bounds = vec![BoundingSphere {
+            center: 0.5 * (self.bounds.min + self.bounds.max),
+            radius: self.bounds.radius(),
+        }];
         self
     }
 
@@ -189,4 +187,24 @@ fn instance_area(scene: &Scene, instance: &super::Instance) -> f64 {
             0.5 * (b - a).cross(c - a).length()
         })
         .sum()
+}
+
+#[cfg(all(test, feature = "samples"))]
+mod tests {
+    use super::*;
+    use crate::scene::samples;
+
+    #[test]
+    fn what_cannot_be_told_is_presumed() {
+        let scene = samples::cornell(0.0);
+        let own = SceneSummary::of(&scene).unwrap();
+        let all = own.clone().presuming_all();
+        all.validate(&scene.lights).unwrap();
+        assert!(own.metals.is_empty() && !all.metals.is_empty() && !all.dielectrics.is_empty());
+        assert_eq!((own.lights_with_extent, all.lights_with_extent), (0, 1));
+        assert_eq!(all.specular_bounds.len(), 1);
+        let (center, radius) = (all.specular_bounds[0].center, all.specular_bounds[0].radius);
+        assert!((own.bounds.max - center).length() <= radius * (1.0 + 1e-12));
+        assert_eq!((all.area, all.total_flux), (own.area, own.total_flux));
+    }
 }
