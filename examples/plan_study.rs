@@ -97,10 +97,10 @@ fn scenes() -> Vec<(&'static str, Scene, bool)> {
     let cornell = || samples::cornell(0.0);
     let mut empty = cornell();
     empty.lights.clear();
-    let mut convex = cornell();
+    let mut box_alone = cornell();
     let is_block = |scene: &Scene, mesh: usize| scene.meshes[mesh].name.contains("block");
-    let all = std::mem::take(&mut convex.instances);
-    convex.instances = all.into_iter().filter(|i| !is_block(&convex, i.mesh)).collect();
+    let all = std::mem::take(&mut box_alone.instances);
+    box_alone.instances = all.into_iter().filter(|i| !is_block(&box_alone, i.mesh)).collect();
     let mut black = cornell();
     for material in &mut black.materials {
         material.base_color = [0.0; 3];
@@ -108,7 +108,7 @@ fn scenes() -> Vec<(&'static str, Scene, bool)> {
     }
     vec![
         ("no light", empty, false),
-        ("convex room, one bulb", convex, false),
+        ("an empty box, one bulb", box_alone, false),
         ("nothing specular", cornell(), false),
         ("a ball of glass", samples::glass_sphere(0.0), false),
         ("all black", black, false),

@@ -11,10 +11,10 @@
 //! pixel, as passes see it; of pictures that are summed of many frames all over each pixel. Or it comes from a file.
 //!
 //! Written to the folder `--out`: `tradeoff.csv`, a row for each point as soon as it is measured, which is not measured again
-//! on the same adapter unless `--fresh` is given; and of all rows of each scene `NAME.svg`, error over time with the front drawn
-//! and presets marked, and in `tradeoff.md` the tables that are printed: presets, the front, what a step of each knob costs and
-//! gains, and how near estimates without a truth come. Times are medians of frames, of GPU timestamps where the adapter is a GPU, else on the wall;
-//! ratios are of one run where rows are.
+//! on the same adapter unless `--fresh` is given; and of all rows of each scene `NAME.svg`, error over time with the front
+//! drawn and presets marked, and in `tradeoff.md` the tables that are printed: presets, the front, what a step of each knob
+//! costs and gains, and how near estimates without a truth come. Times are medians of frames, of GPU timestamps where the
+//! adapter is a GPU, else on the wall; ratios are of one run where rows are.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -109,6 +109,7 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     bar.set_style(ProgressStyle::with_template("{bar:30} {pos}/{len} {msg}").map_err(|e| e.to_string())?);
     let mut text = format!("{}, {} × {} pixels\n", gpu.describe(), arguments.size, arguments.size);
     for (name, scene) in arguments.scenes.iter().zip(scenes) {
+        let name = &stem(name);
         let mut subject = Subject::new(&gpu, arguments, name, scene);
         for point in &points {
             bar.inc(1);
@@ -121,7 +122,7 @@ fn run(arguments: &Arguments) -> Result<(), String> {
             }
         }
         let own = rows.of_scene(&subject.key(&points[0]));
-        plot::draw(&arguments.out.join(format!("{}.svg", stem(name))), name, &own)?;
+        plot::draw(&arguments.out.join(format!("{name}.svg")), name, &own)?;
         text += &tables::of_scene(name, &own);
     }
     bar.finish_and_clear();
@@ -131,7 +132,7 @@ fn run(arguments: &Arguments) -> Result<(), String> {
     gpu.check()
 }
 
-/// What files of a scene are called.
+/// A scene's name without its folder.
 fn stem(name: &str) -> String {
     let name = name.trim_start_matches("sample:");
     let stem = std::path::Path::new(name).file_stem();

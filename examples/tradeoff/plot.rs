@@ -26,7 +26,7 @@ fn try_draw(path: &Path, name: &str, rows: &[&Row]) -> Result<(), Box<dyn std::e
     let range = |of: fn((f64, f64)) -> f64| {
         let values = || rows.iter().map(|row| of(at(row)));
         let (low, high) = (values().fold(f64::MAX, f64::min), values().fold(0.0, f64::max));
-        (low / 1.3..high * 1.3).log_scale()
+        (low / 1.3..high * 2.0).log_scale()
     };
     let area = SVGBackend::new(path, (820, 540)).into_drawing_area();
     area.fill(&WHITE)?;

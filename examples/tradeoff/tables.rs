@@ -111,7 +111,8 @@ fn steps(text: &mut String, rows: &[Row]) {
 fn estimates(text: &mut String, rows: &[&Row]) {
     line!(
         text,
-        "\n| tracer | estimates | within a factor of {NEAR} | median of estimate over truth | share of flux unconfirmed |\n|---|---|---|---|---|"
+        "\n| tracer | estimates | within a factor of {NEAR} | median of estimate over truth | flux unconfirmed |\n\
+        |---|---|---|---|---|"
     );
     for tracer in ["image-space", "hybrid", "bvh"] {
         let own: Vec<&&Row> = rows.iter().filter(|r| r.tracer == tracer).collect();

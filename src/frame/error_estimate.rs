@@ -111,7 +111,9 @@ mod tests {
             let (noise, apart) = (f64::from(spread).powi(2) / 12.0, (3.0 * f64::from(blur)).powi(2) / 2.0);
             assert!((told.noise - noise).abs() < 0.05 * noise + 1e-9, "{told:?} {noise}");
             let wanted = BLUR_SHARE * apart;
-            assert!((told.blur - wanted).abs() < 0.05 * wanted + 2e-4, "{told:?} {wanted}");
+            // What is divided by is noisy, too: 3/2 of the squared variance.
+            let allowed = 0.05 * wanted + 2.0 * noise * noise + 5e-5;
+            assert!((told.blur - wanted).abs() < allowed, "{told:?} {wanted}");
         }
         let (large, small) = (vec![[1.0; 3]; 4], vec![[1.0; 3]; 3]);
         let error = ErrorEstimate::of([&large, &small], [&large, &large]).unwrap_err();

@@ -235,10 +235,10 @@ impl GiRenderer {
         })
     }
 
-    /// Takes other settings. Call it right before `set_scene`, which allocates for them: what the old ones made and the new ones do
-    /// not share is dropped at once, and what views hold is made anew when they are recorded. Pipelines stay unless the tracer,
-    /// a method or the form of splats is another one; so do the places of environment maps, as many as there may be. Photons are
-    /// forgotten, kept light too, and a `PhotonFeeder` of other photons. For a change now and then, as a
+    /// Takes other settings. Call it right before `set_scene`, which allocates for them: what the old ones made and the new ones
+    /// do not share is dropped at once, and what views hold is made anew when they are recorded. Pipelines stay unless the
+    /// tracer, a method or the form of splats is another one; so do the places of environment maps, as many as there may be.
+    /// Photons are forgotten, kept light too, and a `PhotonFeeder` of other photons. For a change now and then, as a
     /// [`BudgetController`](super::BudgetController) asks for, not for every frame.
     ///
     /// # Errors

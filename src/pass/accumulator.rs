@@ -156,10 +156,10 @@ impl AccumulatorResources {
         &self.mean
     }
 
-    /// The noise left in the mean, told by how far the mean of the first frames, some power of two and at least half of them, is
-    /// from that of the others: relMSE as in `reference::metrics` of all pixels, as far as it is variance; infinite with fewer
-    /// than two frames. Where the camera is jittered, what that changes at edges counts; blur, which all frames share, does
-    /// not. Submits and waits.
+    /// The noise left in the mean, told by how far the mean of the first frames, some power of two and at least half of them,
+    /// is from that of the others: relMSE as in `reference::metrics` of all pixels, as far as it is variance; infinite with
+    /// fewer than two frames. Where the camera is jittered, what that changes at edges counts; blur, which all frames share,
+    /// does not. Submits and waits.
     ///
     /// # Errors
     /// [`Error::ReadBack`], [`Error::LimitExceeded`].
