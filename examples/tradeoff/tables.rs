@@ -85,18 +85,22 @@ fn front_table(text: &mut String, rows: &[&Row]) {
 fn steps(text: &mut String, rows: &[Row]) {
     line!(
         text,
-        "\n| knob | tracer | step | time | error | energy bias |\n|---|---|---|---|---|---|"
+        "\n| knob | base | step | time | error | energy bias |\n|---|---|---|---|---|---|"
     );
+    let of = |row: &Row| [&row.base, &row.tracer, &row.component, &row.knob].map(String::clone);
     for pair in rows.windows(2) {
         let [a, b] = pair else { continue };
-        if b.knob == PRESET || (&a.knob, &a.tracer, &a.component) != (&b.knob, &b.tracer, &b.component) {
+        if b.knob == PRESET || of(a) != of(b) {
             continue;
         }
         line!(
             text,
             "| `{}` | {} | {} → {} | × {:.2} | × {:.2} | {:+.2} → {:+.2} % |",
             b.knob,
-            if b.component == "direct" { "–" } else { &b.tracer },
+            match b.component.as_str() {
+                "direct" => b.base.clone(),
+                _ => format!("{}, {}", b.base, b.tracer),
+            },
             a.value,
             b.value,
             b.ms / a.ms,
@@ -124,7 +128,7 @@ fn estimates(text: &mut String, rows: &[&Row]) {
             continue;
         }
         ratios.sort_by(f64::total_cmp);
-        let near = ratios.iter().filter(|&&r| r <= NEAR && r >= 1.0 / NEAR).count();
+        let near = ratios.iter().filter(|&&r| (1.0 / NEAR..=NEAR).contains(&r)).count();
         let unconfirmed = own.iter().filter_map(|r| r.unconfirmed).fold(0.0, f64::max);
         line!(
             text,

@@ -175,7 +175,7 @@ impl AccumulatorResources {
         let frames = f64::from(self.frames);
         let pairs = || {
             let channels = |(all, part): (&[f32; 4], &[f32; 4])| [0, 1, 2].map(|c| [all[c], part[c]].map(f64::from));
-            all.iter().zip(&part).flat_map(move |pair| channels(pair))
+            all.iter().zip(&part).flat_map(channels)
         };
         let count = pairs().count().max(1) as f64;
         let guard = BLACK_GUARD * pairs().map(|[all, _]| all / frames).sum::<f64>() / count;
