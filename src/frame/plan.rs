@@ -469,7 +469,11 @@ fn simplifications(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
             }
         ));
     }
-    if settings.indirect_method == IndirectMethod::FinalGather && !specular.is_empty() {
+    let gathers = matches!(
+        settings.indirect_method,
+        IndirectMethod::FinalGather | IndirectMethod::IlluminationMaps
+    );
+    if gathers && !specular.is_empty() {
         notes.push(format!("gathered light does not come by way of {}", list(&specular)));
     }
     if summary.emissive_triangles.len() > MAX_DIRECT_POLYGONS {
