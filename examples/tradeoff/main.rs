@@ -117,11 +117,11 @@ fn run(arguments: &Arguments) -> Result<(), String> {
                 continue;
             }
             bar.set_message(format!("{name} {}", point.name()));
-            if arguments.fresh || !rows.has(&subject.key(point)) {
+            if arguments.fresh || !rows.has(&subject.unmeasured(point)) {
                 rows.add(subject.measure(point)?)?;
             }
         }
-        let own = rows.of_scene(&subject.key(&points[0]));
+        let own = rows.of_scene(&subject.unmeasured(&points[0]));
         plot::draw(&arguments.out.join(format!("{name}.svg")), name, &own)?;
         text += &tables::of_scene(name, &own);
     }

@@ -6,7 +6,7 @@ use crate::common::clock::Clock;
 use crate::common::offline::{Component, Offline};
 use crate::common::reference::Reference;
 use crate::common::truth_file;
-use crate::rows::{Key, Row};
+use crate::rows::Row;
 use crate::sweep::Point;
 use lightfall::frame::Settings;
 use lightfall::pass::HopStatistics;
@@ -51,9 +51,10 @@ impl<'a> Subject<'a> {
         !point.is_direct || (self.arguments.truth.is_none() && has_extent())
     }
 
-    pub(crate) fn key(&self, point: &Point) -> Key {
+    /// A row without figures.
+    pub(crate) fn unmeasured(&self, point: &Point) -> Row {
         let arguments = self.arguments;
-        Key {
+        Row {
             adapter: self.gpu.info.name.clone(),
             scene: self.name.into(),
             size: arguments.size,
@@ -66,6 +67,7 @@ impl<'a> Subject<'a> {
             tracer: point.tracer.clone(),
             knob: point.knob.clone(),
             value: point.value.clone(),
+            ..Row::default()
         }
     }
 
@@ -92,17 +94,7 @@ impl<'a> Subject<'a> {
         if !comparison.finite {
             return Err(format!("{}, {}: the picture is not finite", self.name, point.name()));
         }
-        let key = self.key(point);
         Ok(Row {
-            adapter: key.adapter,
-            scene: key.scene,
-            size: key.size,
-            truth: key.truth,
-            component: key.component,
-            base: key.base,
-            tracer: key.tracer,
-            knob: key.knob,
-            value: key.value,
             ms: clock.frame_ms()[0] * f64::from(point.settings.frames),
             // The truth's own noise, taken out, may leave less than nothing.
             relmse: comparison.relmse.max(LEAST_ERROR),
@@ -110,6 +102,7 @@ impl<'a> Subject<'a> {
             noise: estimate.map(|e| e.noise),
             blur: estimate.map(|e| e.blur),
             unconfirmed: (!point.is_direct).then(|| unconfirmed(&statistics)),
+            ..self.unmeasured(point)
         })
     }
 

@@ -4,23 +4,8 @@ use serde::{Deserialize, Serialize};
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 
-/// What tells a point from all others.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Key {
-    pub(crate) adapter: String,
-    pub(crate) scene: String,
-    pub(crate) size: u32,
-    /// A file, or paths of each pixel.
-    pub(crate) truth: String,
-    pub(crate) component: String,
-    pub(crate) base: String,
-    pub(crate) tracer: String,
-    pub(crate) knob: String,
-    pub(crate) value: String,
-}
-
 /// A point and its figures.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Row {
     pub(crate) adapter: String,
     pub(crate) scene: String,
@@ -44,19 +29,16 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    pub(crate) fn key(&self) -> Key {
-        let row = self.clone();
-        Key {
-            adapter: row.adapter,
-            scene: row.scene,
-            size: row.size,
-            truth: row.truth,
-            component: row.component,
-            base: row.base,
-            tracer: row.tracer,
-            knob: row.knob,
-            value: row.value,
-        }
+    /// Whether both are of the same scene, as large and compared with the same truth.
+    fn is_of_scene(&self, other: &Self) -> bool {
+        let of = |row: &Self| [&row.adapter, &row.scene, &row.truth].map(String::clone);
+        self.size == other.size && of(self) == of(other)
+    }
+
+    /// Whether both are of the same point, whatever its figures.
+    fn is_of_point(&self, other: &Self) -> bool {
+        let of = |row: &Self| [&row.component, &row.base, &row.tracer, &row.knob, &row.value].map(String::clone);
+        self.is_of_scene(other) && of(self) == of(other)
     }
 }
 
@@ -82,20 +64,15 @@ impl Rows {
         })
     }
 
-    pub(crate) fn has(&self, key: &Key) -> bool {
-        self.rows.iter().any(|row| row.key() == *key)
+    pub(crate) fn has(&self, point: &Row) -> bool {
+        self.rows.iter().any(|row| row.is_of_point(point))
     }
 
-    /// All of the scene that a key is of, as large and compared with the same truth; of rows of the same point the last one.
-    pub(crate) fn of_scene(&self, key: &Key) -> Vec<Row> {
-        let is_of = |own: &Key| {
-            (&own.adapter, &own.scene, own.size, &own.truth) == (&key.adapter, &key.scene, key.size, &key.truth)
-        };
-        let keys: Vec<Key> = self.rows.iter().map(Row::key).collect();
-        let is_last = |index: usize| !keys[index + 1..].contains(&keys[index]);
-        let indexed = self.rows.iter().enumerate();
-        let kept = indexed.filter(|(index, _)| is_of(&keys[*index]) && is_last(*index));
-        kept.map(|(_, row)| row.clone()).collect()
+    /// All of the scene that a row is of; of rows of the same point the last one.
+    pub(crate) fn of_scene(&self, scene: &Row) -> Vec<Row> {
+        let indexed = self.rows.iter().enumerate().filter(|(_, row)| row.is_of_scene(scene));
+        let last = indexed.filter(|(index, row)| !self.rows[index + 1..].iter().any(|later| later.is_of_point(row)));
+        last.map(|(_, row)| row.clone()).collect()
     }
 
     /// Appends a row, in the file too.
