@@ -14,11 +14,9 @@ use std::f64::consts::{PI, TAU};
 /// The mean of `samples` paths a pixel.
 fn render(gpu: &Gpu, scene: &Scene, settings: &PathTracerSettings, size: [u32; 2], samples: u32) -> PathEstimate {
     let mut reference = Reference::new(gpu, scene.clone(), settings, 0, size).unwrap();
-    for _ in 0..samples {
-        reference.render_sample(None).unwrap();
-    }
+    let estimate = reference.trace(samples).unwrap();
     assert_no_errors(gpu);
-    reference.read().unwrap()
+    estimate
 }
 
 /// Mean over all pixels and channels.

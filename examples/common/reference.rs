@@ -88,10 +88,7 @@ impl<'a> Reference<'a> {
                 transform: DAffine3::from_cols(forward.cross(up), up, -forward, eye),
                 projection: Projection::Perspective { fov_y: FRAC_PI_2 },
             });
-            for _ in 0..samples {
-                self.render_sample(None)?;
-            }
-            let estimate = self.read()?;
+            let estimate = self.trace(samples)?;
             for (pixel, (mean, error)) in (0..).zip(estimate.mean.iter().zip(&estimate.standard_error)) {
                 let weight = PI * form_factor(face == 0, [pixel % size, pixel / size], size);
                 let of_rgb = |rgb: &[f32; 3]| rgb.iter().map(|&v| f64::from(v)).sum::<f64>();
@@ -100,6 +97,14 @@ impl<'a> Reference<'a> {
             }
         }
         Ok([sum[0], sum[1].sqrt()])
+    }
+
+    /// The mean of so many more paths for each pixel and those before, and its standard error.
+    pub(crate) fn trace(&mut self, samples: u32) -> Result<PathEstimate, Error> {
+        for _ in 0..samples {
+            self.render_sample(None)?;
+        }
+        self.read()
     }
 
     /// Traces one more path for each pixel and waits for them.

@@ -21,10 +21,7 @@ pub(crate) fn truth(gpu: &Gpu, scene: &Scene, bounces: u32) -> Result<PathEstima
         ..PathTracerSettings::default()
     };
     let mut reference = Reference::new(gpu, scene.clone(), &paths, 0, [SIZE; 2]).map_err(|e| e.to_string())?;
-    for _ in 0..SAMPLES {
-        reference.render_sample(None).map_err(|e| e.to_string())?;
-    }
-    reference.read().map_err(|e| e.to_string())
+    reference.trace(SAMPLES).map_err(|e| e.to_string())
 }
 
 /// Relative mean square error, less what the truth's noise adds, and bias.
