@@ -114,10 +114,7 @@ fn settings(arguments: &Arguments) -> Result<Settings, String> {
     let mut settings = Settings::preset(&arguments.preset)
         .ok_or_else(|| format!("--preset {:?}: expected fast, balanced or accurate", arguments.preset))?;
     for pair in &arguments.set {
-        let (key, value) = pair
-            .split_once('=')
-            .ok_or_else(|| format!("--set {pair:?}: expected KEY=VALUE"))?;
-        let (key, value) = (key.trim(), value.trim());
+        let (key, value) = arguments::key_and_value(pair)?;
         if ["frames", "tracer.kind"].contains(&key) {
             return Err(format!(
                 "--set {key}: not here; frames are not accumulated, and --tracers names tracers"

@@ -452,10 +452,8 @@ fn settings(arguments: &Arguments) -> Result<Settings, String> {
 fn apply(arguments: &Arguments, settings: &mut Settings) -> Result<(), String> {
     let mut set = |key: &str, value: &str| settings.set(key, value).map_err(|e| e.to_string());
     for pair in &arguments.set {
-        let (key, value) = pair
-            .split_once('=')
-            .ok_or_else(|| format!("--set {pair:?}: expected KEY=VALUE"))?;
-        set(key.trim(), value.trim())?;
+        let (key, value) = arguments::key_and_value(pair)?;
+        set(key, value)?;
     }
     if let Some(tracer) = arguments.tracer.and_then(|t| t.to_possible_value()) {
         set("tracer.kind", tracer.get_name())?;

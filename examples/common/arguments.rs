@@ -14,3 +14,11 @@ pub(crate) fn parse<T: clap::Parser>(program: &str) -> T {
         error.exit()
     })
 }
+
+/// The parts of an argument of `--set`, trimmed.
+pub(crate) fn key_and_value(pair: &str) -> Result<(&str, &str), String> {
+    let (key, value) = pair
+        .split_once('=')
+        .ok_or_else(|| format!("--set {pair:?}: expected KEY=VALUE"))?;
+    Ok((key.trim(), value.trim()))
+}

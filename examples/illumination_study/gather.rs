@@ -5,6 +5,7 @@
 
 use crate::Arguments;
 use crate::common::adapter::Gpu;
+use crate::common::arguments::key_and_value;
 use crate::common::clock::median;
 use crate::common::offline::{self, Component, Offline};
 use crate::common::reference::Reference;
@@ -115,10 +116,8 @@ pub(crate) fn errors(gpu: &Gpu, arguments: &Arguments) -> Result<(), String> {
     let all_settings = |overrides| {
         let mut settings = settings([arguments.places, arguments.photons, arguments.bounces], overrides)?;
         for pair in &arguments.set {
-            let (key, value) = pair
-                .split_once('=')
-                .ok_or_else(|| format!("--set {pair:?}: expected KEY=VALUE"))?;
-            settings.set(key.trim(), value.trim()).map_err(|e| e.to_string())?;
+            let (key, value) = key_and_value(pair)?;
+            settings.set(key, value).map_err(|e| e.to_string())?;
         }
         Ok::<_, String>(settings)
     };
