@@ -143,8 +143,11 @@ fn measure(
     (presumes_all, stands_still): (bool, bool),
 ) -> Result<Measured, Error> {
     let size = [arguments.size; 2];
-    let mut offline = Offline::new(gpu, scene.clone(), settings, 0, size, Component::All)?;
-    offline.presumes_all = presumes_all;
+    let mut summary = SceneSummary::of(scene)?;
+    if presumes_all {
+        summary = summary.presuming_all();
+    }
+    let mut offline = Offline::with_summary(gpu, (scene.clone(), summary), settings, 0, size, Component::All)?;
     let timestamps = Timestamps::new(&gpu.device)?;
     let (mut times, mut passes) = (Vec::new(), Vec::new());
     // All is captured first, and places of environment maps are chosen.

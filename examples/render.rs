@@ -61,7 +61,7 @@ enum Method {
 #[command(args_override_self = true, after_help = "Not available yet: glTF skins.")]
 struct Arguments {
     /// A .glb or .gltf file, or sample:NAME (cornell, cornell-spot, bumpy-floor, plane, furnace, two-rooms, pillars,
-    /// penumbra, living-room, colonnade, glass-sphere, ring-occluder, dimpled-mirror, water, courtyard)
+    /// penumbra, living-room, colonnade, nave, glass-sphere, ring-occluder, dimpled-mirror, water, courtyard)
     scene: String,
     /// Width in pixels
     #[arg(long, default_value_t = 512)]

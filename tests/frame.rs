@@ -1285,33 +1285,3 @@ fn other_settings_are_as_those_of_a_new_renderer() {
     kept.render_frame(None).unwrap();
     assert_no_errors(&gpu);
 }
-
-#[test]
-fn what_a_scene_does_not_need_is_left_out_and_changes_nothing() {
-    let Some(gpu) = gpu() else { return };
-    let mut black = samples::cornell(0.0);
-    for material in &mut black.materials {
-        (material.base_color, material.base_color_texture) = ([0.0; 3], None);
-    }
-    // Nothing specular; nothing that reflects.
-    for (scene, saved) in [(samples::cornell(0.0), 1.2), (black, 4.0)] {
-        let render = |presumes_all: bool| {
-            let mut offline = Offline::new(&gpu, scene.clone(), &small(), 0, [48, 32], Component::All).unwrap();
-            offline.presumes_all = presumes_all;
-            offline.in_motion = false;
-            offline.render_frame(None).unwrap();
-            let bytes = offline.renderer.memory_use() + offline.view.memory_use();
-            let plan = offline.renderer.plan().unwrap();
-            let stages = plan.stages.iter().filter(|stage| stage.on).count();
-            (offline.read().unwrap(), stages, bytes)
-        };
-        let (planned, presumed) = (render(false), render(true));
-        assert!(planned.0 == presumed.0, "the picture is the same");
-        println!(
-            "stages {} of {}, bytes {} of {}",
-            planned.1, presumed.1, planned.2, presumed.2
-        );
-        assert!(planned.1 < presumed.1 && planned.2 as f64 * saved < presumed.2 as f64);
-    }
-    assert_no_errors(&gpu);
-}

@@ -40,8 +40,6 @@ pub(crate) struct Offline<'a> {
     accumulator: Option<(Accumulator, AccumulatorResources)>,
     /// Whether every frame is taken for one of a scene that changes; not while frames are accumulated.
     pub(crate) in_motion: bool,
-    /// Whether the renderer is told no more of the scene than it has to be.
-    pub(crate) presumes_all: bool,
     /// Whether no frame was rendered so far.
     is_first: bool,
     /// How many pictures' photons of the random sequence are left to others.
@@ -65,12 +63,24 @@ impl<'a> Offline<'a> {
         size: [u32; 2],
         component: Component,
     ) -> Result<Self, Error> {
+        let summary = SceneSummary::of(&scene)?;
+        Self::with_summary(gpu, (scene, summary), settings, camera, size, component)
+    }
+
+    /// The same of a scene that the renderer is told other things of than are true.
+    pub(crate) fn with_summary(
+        gpu: &'a Gpu,
+        (scene, summary): (Scene, SceneSummary),
+        settings: &Settings,
+        camera: usize,
+        size: [u32; 2],
+        component: Component,
+    ) -> Result<Self, Error> {
         let (device, queue) = (&gpu.device, &gpu.queue);
         let mut geometry = MeshGeometry::new(device, queue, &scene)?;
         let bvh = || BvhGeometry::new(device, queue, &scene, &BvhGeometryConfig::default());
         let bvh = settings.uses_triangles().then(bvh).transpose()?;
         let mut renderer = GiRenderer::new(device, settings)?;
-        let summary = SceneSummary::of(&scene)?;
         renderer.set_environment(queue, scene.environment_image())?;
         renderer.set_scene(queue, &summary, &scene.lights)?;
         renderer.place_env_maps_blocking(queue, &mut geometry)?;
@@ -102,7 +112,6 @@ impl<'a> Offline<'a> {
             geometry,
             bvh,
             in_motion: accumulator.is_none(),
-            presumes_all: false,
             is_first: true,
             pictures_before: 0,
             points,
@@ -128,11 +137,7 @@ impl<'a> Offline<'a> {
         let place = |p: &SurfacePoint| p.in_world(&self.scene.instances[p.instance].transform);
         let places: Vec<_> = self.points.iter().map(place).collect();
         self.renderer.set_surface_places(&places);
-        let summary = match self.presumes_all {
-            true => self.summary.clone().presuming_all(),
-            false => self.summary.clone(),
-        };
-        let frame = self.renderer.set_scene(queue, &summary, &self.scene.lights)?;
+        let frame = self.renderer.set_scene(queue, &self.summary, &self.scene.lights)?;
         if self.in_motion {
             self.renderer.geometry_changed();
         }

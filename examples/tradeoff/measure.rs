@@ -7,7 +7,7 @@ use crate::common::offline::{Component, Offline};
 use crate::common::reference::Reference;
 use crate::common::truth_file;
 use crate::rows::Row;
-use crate::sweep::Point;
+use crate::sweep::{Concern, Point};
 use lightfall::frame::Settings;
 use lightfall::pass::HopStatistics;
 use lightfall::reference::metrics::{self, Image, Truth};
@@ -29,7 +29,7 @@ pub(crate) struct Subject<'a> {
 /// What a truth is of.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct TruthKind {
-    is_direct: bool,
+    component: Component,
     spans_pixel: bool,
     bounces: u32,
 }
@@ -45,10 +45,16 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// Whether a point is of anything here: shadows are where lights have an extent.
+    /// Whether a point is of anything here: shadows are where lights have an extent. A truth from a file is of indirect light.
     pub(crate) fn concerns(&self, point: &Point) -> bool {
-        let has_extent = || SceneSummary::of(&self.scene).is_ok_and(|s| s.lights_with_extent > 0);
-        !point.is_direct || (self.arguments.truth.is_none() && has_extent())
+        let is_in_scene = |is: fn(&SceneSummary) -> bool| SceneSummary::of(&self.scene).is_ok_and(|s| is(&s));
+        let is_there = match point.concern {
+            Concern::Shadows => is_in_scene(|s| s.lights_with_extent > 0),
+            Concern::Specular => is_in_scene(|s| !(s.metals.is_empty() && s.dielectrics.is_empty())),
+            Concern::Environment => is_in_scene(|s| s.environment_lights > 0),
+            Concern::Any | Concern::EnvMaps | Concern::Hybrid | Concern::Triangles => true,
+        };
+        is_there && (self.arguments.truth.is_none() || point.concern.component() == Component::Indirect)
     }
 
     /// A row without figures.
@@ -62,7 +68,7 @@ impl<'a> Subject<'a> {
                 Some(path) => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
                 None => format!("{} paths", arguments.samples),
             },
-            component: if point.is_direct { "direct" } else { "indirect" }.into(),
+            component: format!("{:?}", point.concern.component()).to_lowercase(),
             base: point.base.clone(),
             tracer: point.tracer.clone(),
             knob: point.knob.clone(),
@@ -84,9 +90,10 @@ impl<'a> Subject<'a> {
             }
         }
         let statistics = offline.statistics().map_err(|e| e.to_string())?;
-        let estimate = match point.is_direct {
-            true => None,
-            false => offline.estimate_error().map_err(|e| e.to_string())?,
+        let is_indirect = point.concern.component() == Component::Indirect;
+        let estimate = match is_indirect {
+            true => offline.estimate_error().map_err(|e| e.to_string())?,
+            false => None,
         };
         drop(offline);
         self.gpu.check()?;
@@ -101,16 +108,13 @@ impl<'a> Subject<'a> {
             bias: comparison.bias,
             noise: estimate.map(|e| e.noise),
             blur: estimate.map(|e| e.blur),
-            unconfirmed: (!point.is_direct).then(|| unconfirmed(&statistics)),
+            unconfirmed: is_indirect.then(|| unconfirmed(&statistics)),
             ..self.unmeasured(point)
         })
     }
 
     fn offline(&self, point: &Point) -> Result<Offline<'a>, String> {
-        let component = match point.is_direct {
-            true => Component::Direct,
-            false => Component::Indirect,
-        };
+        let component = point.concern.component();
         let size = [self.arguments.size; 2];
         let mut offline = Offline::new(self.gpu, self.scene.clone(), &point.settings, 0, size, component)
             .map_err(|e| e.to_string())?;
@@ -128,7 +132,7 @@ impl<'a> Subject<'a> {
 
     fn truth(&mut self, point: &Point) -> Result<&Truth, String> {
         let kind = TruthKind {
-            is_direct: point.is_direct,
+            component: point.concern.component(),
             spans_pixel: point.settings.frames > 1,
             // Of a knob that is turned the base's.
             bounces: Settings::preset(&point.base).map_or(0, |base| base.bounces),
@@ -152,9 +156,12 @@ impl<'a> Subject<'a> {
 
     fn traced(&self, kind: TruthKind) -> Result<Truth, String> {
         let paths = PathTracerSettings {
-            component: match kind.is_direct {
-                true => PathComponent::Direct,
-                false => PathComponent::Indirect,
+            component: match kind.component {
+                Component::All => PathComponent::All,
+                Component::Direct => PathComponent::Direct,
+                Component::Indirect => PathComponent::Indirect,
+                Component::Caustic => PathComponent::Caustic,
+                Component::Specular => PathComponent::Specular,
             },
             bounces: kind.bounces,
             spans_pixel: kind.spans_pixel,

@@ -2,12 +2,13 @@
 //! by what frames take, or by how far off they are.
 //!
 //! Between two rungs the number of photons goes from that of the one to that of the other, everything else is as on the lower
-//! one. What a place on the ladder takes is known but for the scene: readings are taken to be a power of it, times the scene's
-//! load. A reading outside of the dead band moves the place by what that says; two readings in a row at different places say
-//! what the power is. Where no place keeps to the budget without falling far short of it, as across a rung that takes more at
-//! once, the last place within the budget is kept, and the other one tried again after ever longer times.
+//! one. What a place on the ladder takes is known but for the scene: readings are taken to be what the ladder says, each step
+//! from rung to rung to a power of its own, times the scene's load. A reading outside of the dead band moves the place by what
+//! that says; two readings in a row at different places say what the powers between them are. Where no place keeps to the
+//! budget without falling far short of it, as across a rung that takes more at once, the last place within the budget is kept,
+//! and the other one tried again after ever longer times.
 
-use super::{Settings, TracerKind};
+use super::{Settings, TracerKind, Upsampling};
 use crate::Error;
 
 /// What to keep to.
@@ -48,10 +49,10 @@ pub struct BudgetController {
     bounds: [Option<f64>; 2],
     /// Readings for which the place beside is left alone, and how many of them there have been.
     patience: [usize; 2],
-    /// Logarithms of what the ladder says and of the reading, where it was before.
+    /// The place before, and the logarithm of the reading there.
     last: Option<[f64; 2]>,
-    /// Power of what the ladder says that readings are.
-    gain: f64,
+    /// From each rung to the next: power of what the ladder says that readings are.
+    gains: Vec<f64>,
 }
 
 /// Readings that a place is left by the median of.
@@ -75,17 +76,17 @@ const LEAST_GAP: f64 = 0.05;
 /// Readings after which the place beside one that is not near is tried again at first, and at most; twice as many each time.
 const PATIENCE: [usize; 2] = [10, 640];
 
-/// Bounds of the gain: a load that changes while the place does is taken for one.
+/// Bounds of gains: a load that changes while the place does is taken for one.
 const GAINS: [f64; 2] = [0.25, 3.0];
 
-/// Least way along the ladder, as a logarithm, that says anything of the gain.
+/// Least way along the ladder, as a logarithm, that says anything of gains.
 const LEAST_STEP: f64 = 0.1;
 
 impl Rung {
     /// The measured front of splatting by this tracer, from the fastest on: times and errors over those of `fast`, of
     /// `docs/tradeoff.md`.
     pub fn ladder(tracer: TracerKind) -> Vec<Self> {
-        let rung = |preset: fn() -> Settings, photons: u32, [time, error]: [f64; 2]| Self {
+        let rung = |preset: &dyn Fn() -> Settings, photons: u32, [time, error]: [f64; 2]| Self {
             settings: Settings {
                 tracer_kind: tracer,
                 photons,
@@ -95,25 +96,33 @@ impl Rung {
             error,
         };
         let (fast, balanced) = (Settings::fast, Settings::balanced);
+        let coarse = || Settings {
+            upsampling: Upsampling::AtOnce,
+            ..balanced()
+        };
         match tracer {
             // More photons alone gain nothing where coarse maps err.
             TracerKind::ImageSpace => vec![
-                rung(fast, 15_000, [0.51, 2.0]),
-                rung(fast, 60_000, [1.0, 1.0]),
-                rung(balanced, 500_000, [7.0, 0.31]),
+                rung(&fast, 15_000, [0.51, 2.0]),
+                rung(&fast, 60_000, [1.0, 1.0]),
+                rung(&coarse, 120_000, [2.05, 0.7]),
+                rung(&coarse, 240_000, [3.5, 0.52]),
+                rung(&balanced, 500_000, [7.6, 0.32]),
             ],
             TracerKind::Hybrid => vec![
-                rung(fast, 15_000, [0.53, 2.0]),
-                rung(fast, 60_000, [1.0, 1.0]),
-                rung(balanced, 500_000, [6.3, 0.27]),
+                rung(&fast, 15_000, [0.53, 2.0]),
+                rung(&fast, 60_000, [1.0, 1.0]),
+                rung(&coarse, 120_000, [1.8, 0.67]),
+                rung(&coarse, 240_000, [3.0, 0.5]),
+                rung(&balanced, 500_000, [6.2, 0.27]),
             ],
             TracerKind::Bvh => vec![
-                rung(fast, 15_000, [0.55, 1.7]),
-                rung(fast, 60_000, [1.0, 1.0]),
-                rung(fast, 240_000, [2.6, 0.69]),
-                rung(fast, 400_000, [3.85, 0.63]),
-                rung(balanced, 240_000, [3.9, 0.5]),
-                rung(balanced, 500_000, [6.4, 0.34]),
+                rung(&fast, 15_000, [0.55, 1.7]),
+                rung(&fast, 60_000, [1.0, 1.0]),
+                rung(&fast, 240_000, [2.6, 0.69]),
+                rung(&fast, 400_000, [3.85, 0.63]),
+                rung(&balanced, 240_000, [3.9, 0.5]),
+                rung(&balanced, 500_000, [6.4, 0.34]),
             ],
         }
     }
@@ -154,6 +163,7 @@ impl BudgetController {
         let mut controller = Self {
             budget,
             place: 0.5 * (ladder.len() - 1) as f64,
+            gains: vec![1.0; ladder.len() - 1],
             ladder,
             settings,
             readings: Vec::new(),
@@ -162,7 +172,6 @@ impl BudgetController {
             bounds: [None; 2],
             patience: [PATIENCE[0], 0],
             last: None,
-            gain: 1.0,
         };
         controller.settings = controller.settings_here();
         Ok(controller)
@@ -192,30 +201,31 @@ impl BudgetController {
         let mut window = self.readings[self.readings.len() - WINDOW..].to_vec();
         self.readings = window.clone();
         window.sort_by(f64::total_cmp);
-        let now = [self.log_at(self.place), window[WINDOW / 2].ln()];
+        let now = window[WINDOW / 2].ln();
         match self.first {
             None => self.learn(now),
-            Some(first) if (now[1] - first).abs() > DEAD_BAND.ln() => {
-                self.first = Some(now[1]);
+            Some(first) if (now - first).abs() > DEAD_BAND.ln() => {
+                self.first = Some(now);
                 self.bounds = [None; 2];
                 self.patience = [PATIENCE[0], 0];
             }
             Some(_) => {}
         }
         let (Budget::Time(most) | Budget::Error(most)) = self.budget;
-        let missing = (AIM * most).ln() - now[1];
+        let missing = (AIM * most).ln() - now;
         let band = if self.is_near { DEAD_BAND } else { NEAR };
         self.is_near = missing.abs() <= band.ln();
         if self.is_near {
             self.patience = [PATIENCE[0], 0];
             return None;
         }
-        let place = self.next_place(now[0] + missing / self.gain, self.sign() * missing > 0.0);
+        let wanted = self.place_of(self.log_at(self.place) + missing);
+        let place = self.next_place(wanted, self.sign() * missing > 0.0);
         if place == self.place {
             return None;
         }
+        self.last = Some([self.place, now]);
         self.place = place;
-        self.last = Some(now);
         self.readings.clear();
         self.first = None;
         let settings = self.settings_here();
@@ -224,18 +234,23 @@ impl BudgetController {
         is_other.then_some(&self.settings)
     }
 
-    /// From the first readings after a change: what power of the ladder they are.
-    fn learn(&mut self, now: [f64; 2]) {
-        self.first = Some(now[1]);
-        if let Some([ladder, read]) = self.last.take()
-            && (now[0] - ladder).abs() >= LEAST_STEP
-        {
-            self.gain = ((now[1] - read) / (now[0] - ladder)).clamp(GAINS[0], GAINS[1]);
+    /// From the first readings after a change: what powers of the ladder they are.
+    fn learn(&mut self, now: f64) {
+        self.first = Some(now);
+        let Some([place, read]) = self.last.take() else { return };
+        let expected = self.log_at(self.place) - self.log_at(place);
+        if expected.abs() < LEAST_STEP {
+            return;
+        }
+        let [low, high] = [place.min(self.place), place.max(self.place)];
+        let ratio = (now - read) / expected;
+        for gain in &mut self.gains[low as usize..high.ceil() as usize] {
+            *gain = (*gain * ratio).clamp(GAINS[0], GAINS[1]);
         }
     }
 
-    /// Where to go from a place that is too low, or too high: where the ladder says so much, within what is known of this load.
-    fn next_place(&mut self, log: f64, is_low: bool) -> f64 {
+    /// Where to go from a place that is too low, or too high: to the wanted one, within what is known of this load.
+    fn next_place(&mut self, wanted: f64, is_low: bool) -> f64 {
         let [low, high] = self.bounds;
         // What is known of other places and does not agree is of another load.
         self.bounds = if is_low {
@@ -245,7 +260,6 @@ impl BudgetController {
             let high = high.map_or(self.place, |high| high.min(self.place));
             [low.filter(|&low| low < high), Some(high)]
         };
-        let wanted = self.place_of(log);
         let [Some(low), Some(high)] = self.bounds else {
             return wanted;
         };
@@ -276,31 +290,37 @@ impl BudgetController {
         }
     }
 
-    /// What the ladder says of a rung.
-    fn log_of(&self, rung: &Rung) -> f64 {
-        match self.budget {
+    /// Logarithm of what each rung takes, as far as the ladder and gains say.
+    fn logs(&self) -> Vec<f64> {
+        let of = |rung: &Rung| match self.budget {
             Budget::Time(_) => rung.time.ln(),
             Budget::Error(_) => rung.error.ln(),
+        };
+        let mut logs = vec![of(&self.ladder[0])];
+        for (pair, gain) in self.ladder.windows(2).zip(&self.gains) {
+            logs.push(logs[logs.len() - 1] + gain * (of(&pair[1]) - of(&pair[0])));
         }
+        logs
     }
 
     /// The rungs below and above a place, and how far it is from the one to the other.
-    fn between(&self, place: f64) -> ([&Rung; 2], f64) {
-        let below = (place as usize).min(self.ladder.len() - 1);
-        let above = (below + 1).min(self.ladder.len() - 1);
-        ([&self.ladder[below], &self.ladder[above]], place - below as f64)
+    fn between(&self, place: f64) -> ([usize; 2], f64) {
+        let last = self.ladder.len() - 1;
+        let below = (place as usize).min(last);
+        ([below, (below + 1).min(last)], place - below as f64)
     }
 
     fn log_at(&self, place: f64) -> f64 {
-        let ([below, above], part) = self.between(place);
-        let [below, above] = [below, above].map(|rung| self.log_of(rung));
+        let (rungs, part) = self.between(place);
+        let logs = self.logs();
+        let [below, above] = rungs.map(|rung| logs[rung]);
         below + part * (above - below)
     }
 
-    /// Where the ladder says so much; an end of it where nothing does.
+    /// Where that much is taken; an end of the ladder where nothing takes it.
     fn place_of(&self, log: f64) -> f64 {
         let sign = self.sign();
-        let logs: Vec<f64> = self.ladder.iter().map(|rung| sign * self.log_of(rung)).collect();
+        let logs: Vec<f64> = self.logs().into_iter().map(|log| sign * log).collect();
         let log = sign * log;
         let above = logs.partition_point(|&l| l <= log);
         match above {
@@ -311,7 +331,8 @@ impl BudgetController {
     }
 
     fn settings_here(&self) -> Settings {
-        let ([below, above], part) = self.between(self.place);
+        let (rungs, part) = self.between(self.place);
+        let [below, above] = rungs.map(|rung| &self.ladder[rung]);
         let photons = |rung: &Rung| f64::from(rung.settings.photons.max(1)).ln();
         let between = photons(below) + part * (photons(above) - photons(below));
         let photons = match part {

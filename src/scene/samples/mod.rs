@@ -4,19 +4,21 @@ mod caustics;
 mod colonnade;
 mod courtyard;
 mod living_room;
+mod nave;
 mod solids;
 
 pub use caustics::{dimpled_mirror, glass_sphere, ring_occluder, water};
 pub use colonnade::colonnade;
 pub use courtyard::courtyard;
 pub use living_room::living_room;
+pub use nave::nave;
 
 use super::{Camera, EnvironmentImage, Instance, Light, LightKind, Material, Mesh, Projection, Scene};
 use glam::{DAffine3, DVec3, Vec3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Names accepted by [`by_name`], in the order of this list.
-pub const NAMES: [&str; 15] = [
+pub const NAMES: [&str; 16] = [
     "cornell",
     "cornell-spot",
     "bumpy-floor",
@@ -27,6 +29,7 @@ pub const NAMES: [&str; 15] = [
     "penumbra",
     "living-room",
     "colonnade",
+    "nave",
     "glass-sphere",
     "ring-occluder",
     "dimpled-mirror",
@@ -47,6 +50,7 @@ pub fn by_name(name: &str, time: f64) -> Option<Scene> {
         "penumbra" => penumbra(time),
         "living-room" => living_room(time),
         "colonnade" => colonnade(time),
+        "nave" => nave(time),
         "glass-sphere" => glass_sphere(time),
         "ring-occluder" => ring_occluder(time),
         "dimpled-mirror" => dimpled_mirror(time),
@@ -531,6 +535,7 @@ mod tests {
             "penumbra",
             "living-room",
             "colonnade",
+            "nave",
             "glass-sphere",
             "ring-occluder",
             "dimpled-mirror",
@@ -600,6 +605,7 @@ mod tests {
         for (name, triangles, size) in [
             ("living-room", 30_122, DVec3::new(7.0, 2.8, 5.5)),
             ("colonnade", 77_430, DVec3::new(40.0, 12.0, 16.0)),
+            ("nave", 80_000, DVec3::new(40.0, 16.0, 18.0)),
         ] {
             let scene = by_name(name, 0.0).unwrap();
             let found = scene.triangle_count();
@@ -635,7 +641,7 @@ mod tests {
     fn solids_of_the_larger_samples_are_closed_and_face_outward() {
         // Rooms face inward and are open: at the window, to the sky.
         const SHELLS: [&str; 5] = ["floor", "ceiling", "back wall", "walls", "outside"];
-        for name in ["living-room", "colonnade"] {
+        for name in ["living-room", "colonnade", "nave"] {
             let scene = by_name(name, 0.0).unwrap();
             for mesh in scene.meshes.iter().filter(|m| !SHELLS.contains(&m.name.as_str())) {
                 let (volume, open_edges) = volume_and_open_edges(mesh);
