@@ -7,9 +7,9 @@
 //! ```
 //!
 //! Times are medians of whole frames in which everything may have moved, of GPU timestamps where the adapter is a GPU, else on
-//! the wall. Adapters differ: what compares is time over that of a table's first row. Errors are of the same pictures, every
-//! `--average` × `--average` pixels as one, against paths traced with as many bounces: of indirect light, or of all light where
-//! the eye sees metal or glass. What the truth's own noise hides is not shown.
+//! the wall. Adapters differ: what compares is time over that of a table's first row. Errors are those of indirect light, every
+//! `--average` × `--average` pixels as one, against paths traced with as many bounces, where all surfaces are diffuse; so few
+//! paths do not find caustics. What the truth's own noise hides is not shown.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -39,7 +39,7 @@ struct Arguments {
     /// Pixels along each axis that errors are of the mean of
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
     average: u32,
-    /// Paths of each of these means; 0 for no errors
+    /// Paths of each of these means; 0: no errors
     #[arg(long, default_value_t = 512)]
     samples: u32,
     /// Preset that rows are made from
@@ -108,10 +108,7 @@ fn line(row: &Row, measured: &Measured, [paper, own]: [f64; 2]) -> String {
     let set: Vec<_> = row.set.iter().map(|(key, value)| format!("{key} {value}")).collect();
     let [width, height] = measured.size;
     let (error, bias) = match &measured.error {
-        Some(error) if error.is_seen() => (
-            format!("{:.4}{}", error.relmse, if error.is_of_all { " of all" } else { "" }),
-            format!("{:+.1} %", 100.0 * error.bias),
-        ),
+        Some(error) if error.is_seen() => (format!("{:.4}", error.relmse), format!("{:+.1} %", 100.0 * error.bias)),
         Some(error) => (format!("below the truth's noise, {:.2}", error.noise), String::new()),
         None => Default::default(),
     };

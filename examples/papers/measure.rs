@@ -30,8 +30,6 @@ pub(crate) struct Error {
     pub(crate) bias: f64,
     /// What relMSE of the truth would be, against itself.
     pub(crate) noise: f64,
-    /// All light was compared; else indirect light.
-    pub(crate) is_of_all: bool,
 }
 
 impl Error {
@@ -67,25 +65,35 @@ pub(crate) fn measure(
         .size
         .map(|side| ((f64::from(side) * arguments.scale / step).round() as u32).max(2));
     let size = means.map(|side| side * arguments.average);
+    let summary = SceneSummary::of(&scene).map_err(text)?;
+    let is_diffuse = summary.metals.is_empty() && summary.dielectrics.is_empty();
+    let mut offline = Offline::new(gpu, scene.clone(), &settings, 0, size, Component::Indirect).map_err(text)?;
+    let mut clock = Clock::new(gpu);
+    clock.settle(gpu, &mut offline)?;
+    // Texels are gathered a few in each frame.
+    for _ in 0..offline.points.len() / settings.illumination_maps.gather.a_frame.max(1) as usize {
+        clock.frame(gpu, &mut offline)?;
+    }
+    let own = offline.read().map_err(text)?;
     let mut measured = Measured {
         scene: name,
         triangles: scene.triangle_count(),
         size,
-        ms: time(gpu, &scene, &settings, size)?,
+        ms: clock.frame_ms()[0],
         error: None,
     };
-    if arguments.samples > 0 {
-        let summary = SceneSummary::of(&scene).map_err(text)?;
-        let is_of_all = !(summary.metals.is_empty() && summary.dielectrics.is_empty());
-        let image = Image {
-            width: size[0],
-            height: size[1],
-            rgb: picture(gpu, &scene, &settings, (size, is_of_all))?,
-        };
-        let own = Truth::new(image).downsampled(arguments.average).map_err(text)?.image;
+    drop(offline);
+    if arguments.samples > 0 && is_diffuse {
+        let [width, height] = size;
+        let own = Truth::new(Image {
+            width,
+            height,
+            rgb: own,
+        });
+        let own = own.downsampled(arguments.average).map_err(text)?.image;
         let key = (name, means, settings.bounces, row.widens_lights);
         if !truths.0.contains_key(&key) {
-            let truth = truth(gpu, arguments, scene, (key, is_of_all))?;
+            let truth = truth(gpu, arguments, scene, key)?;
             truths.0.insert(key, truth);
         }
         let (truth, noise) = &truths.0[&key];
@@ -94,7 +102,6 @@ pub(crate) fn measure(
             relmse: comparison.relmse,
             bias: comparison.bias,
             noise: *noise,
-            is_of_all,
         });
     }
     gpu.check()?;
@@ -151,42 +158,10 @@ fn settings(arguments: &Arguments, row: &Row) -> Result<Settings, String> {
     Ok(settings)
 }
 
-/// Milliseconds of a whole frame.
-fn time(gpu: &Gpu, scene: &Scene, settings: &Settings, size: [u32; 2]) -> Result<f64, String> {
-    let mut offline = Offline::new(gpu, scene.clone(), settings, 0, size, Component::All).map_err(text)?;
-    let mut clock = Clock::new(gpu);
-    clock.settle(gpu, &mut offline)?;
-    Ok(clock.frame_ms()[0])
-}
-
-fn picture(
-    gpu: &Gpu,
-    scene: &Scene,
-    settings: &Settings,
-    (size, is_of_all): ([u32; 2], bool),
-) -> Result<Vec<[f32; 3]>, String> {
-    let component = if is_of_all { Component::All } else { Component::Indirect };
-    let mut offline = Offline::new(gpu, scene.clone(), settings, 0, size, component).map_err(text)?;
-    // Lights on surfaces have a pool to fill, texels are gathered a few in each frame.
-    for _ in 0..=offline.points.len() / settings.illumination_maps.gather.a_frame.max(1) as usize {
-        offline.render_frame(None).map_err(text)?;
-    }
-    offline.read().map_err(text)
-}
-
 /// With what its relMSE against itself would be.
-fn truth(
-    gpu: &Gpu,
-    arguments: &Arguments,
-    scene: Scene,
-    ((_, size, bounces, _), is_of_all): (Key, bool),
-) -> Result<(Truth, f64), String> {
+fn truth(gpu: &Gpu, arguments: &Arguments, scene: Scene, (_, size, bounces, _): Key) -> Result<(Truth, f64), String> {
     let paths = PathTracerSettings {
-        component: if is_of_all {
-            PathComponent::All
-        } else {
-            PathComponent::Indirect
-        },
+        component: PathComponent::Indirect,
         bounces,
         ..Default::default()
     };
