@@ -147,7 +147,8 @@ pub enum CoverageMeasure {
 /// What to try, what to accept, and when enough is seen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EnvMapSelectorSettings {
-    /// Candidates, up to 512. More find better places and cost six coarse captures each, and 150 kB.
+    /// Candidates, up to 512. More find better places and cost six coarse captures each, and 150 kB: four times as many leave a
+    /// hundredth less of the rays to a surer tracer, as much as four more maps do in a living room (`docs/tracing.md`).
     pub candidates: u32,
     /// A candidate that sees more than this share of back faces stands inside a solid.
     pub back_face_limit: f32,

@@ -64,14 +64,16 @@ pub(crate) const SLOTS: [Slot; 9] = [
 pub struct UpsamplerSettings {
     /// Cosine between the shading normals of pixel and sample at and below which the sample is left out, below 1; its
     /// weight rises linearly to 1 where they agree. Higher keeps the sides of an edge apart at flatter edges; lower finds
-    /// samples on surfaces that are strongly curved.
+    /// samples on surfaces that are strongly curved. 0.25, 0.5, 0.75 differ by a hundredth of the error in a hall of pillars
+    /// (`docs/tradeoff.md`).
     pub normal_agreement: f32,
     /// How far off the pixel's tangent plane a sample is left out, above 0, as a share of the distance between both as
     /// seen on the screen; its weight falls linearly to there. Lower keeps thinner steps apart; higher finds samples on
-    /// surfaces that are curved away from the eye.
+    /// surfaces that are curved away from the eye. From 0.05 to 0.4 the error there is the same.
     pub plane_distance: f32,
     /// Difference of the samples around a pixel, as a share of their mean, above which the pixel is marked where marks are
-    /// wanted; 0 or more. Lower estimates more pixels anew.
+    /// wanted; 0 or more. Lower estimates more pixels anew: 0.4, 0.2, 0.1 take 1.6 and 2.0 times the time for 0.89 and 1.01 of
+    /// the error.
     pub disagreement: f32,
 }
 

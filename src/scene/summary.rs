@@ -8,9 +8,9 @@ use std::f64::consts::PI;
 /// Everything that the plan and the unit frame need to know of a scene. A host without a [`Scene`] fills it in by hand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SceneSummary {
-    /// The region that light should fill.
+    /// The region that light should fill. It may be a part of the scene (`docs/plan.md` says what that saves).
     pub bounds: SceneBounds,
-    /// Area of all surfaces, one side counted, world units squared.
+    /// Area of all surfaces in it, one side counted, world units squared.
     pub area: f64,
     /// Triangles over all instances.
     pub triangles: usize,

@@ -128,7 +128,9 @@ pub enum Bandwidth {
     /// so that about `photons` of N photons lie under a kernel. Where photons are guided, divided by the sixth root of how much
     /// denser they are, if half of them are.
     Density {
-        /// k, photons under a kernel: error is least where k grows as N to the 2/3, by which noise and blur fall alike.
+        /// k, photons under a kernel: error is least where k grows as N to the 2/3, by which noise and blur fall alike. Of 60 000
+        /// photons 200 to 400 are best in boxes and 100 in a colonnade; twice as many take up to 1.3 times as long
+        /// (`docs/tradeoff.md`).
         photons: f32,
         /// Range that p̂ is clamped to.
         clamp: [f32; 2],
@@ -158,9 +160,9 @@ pub enum BoundaryCorrection {
 /// Fixed when pipelines are made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PhotonSplatterConfig {
-    /// How kernels are drawn.
+    /// How kernels are drawn. Quads lose 7 % of the light of a box at edges, and volumes take 2.3 times as long as they do.
     pub shape: SplatShape,
-    /// Their weight.
+    /// Their weight. A cone has 0.81 of a constant's error, and Epanechnikov's the same.
     pub kernel: Kernel,
     /// Format that quads and volumes are blended in, one of [`Irradiance::FORMATS`]; `None`: `rgba16float`. Tiles add up in
     /// f32 always.
@@ -187,15 +189,17 @@ pub struct PhotonSplatterSettings {
     /// Kernel radius.
     pub bandwidth: Bandwidth,
     /// Narrowest kernel radius in pixels of the irradiance, 0 or more, before `radius_scale`: a kernel between pixels is seen
-    /// by none of them.
+    /// by none of them. 0, 1 and 2 differ by 3 % of the error (`docs/tradeoff.md`).
     pub min_radius: f32,
     /// Widest kernel radius in pixels of the irradiance, up to 23: bounds the cost of a photon near the eye. Where
-    /// irradiance is sub-sampled, kernels may thus be wider by the factor.
+    /// irradiance is sub-sampled, kernels may thus be wider by the factor. 6, 12, 23: 1.08 and 1.27 times the time and no less
+    /// error where one pixel in 4 × 4 is estimated.
     pub max_radius: f32,
     /// Factor on the radius and on `min_radius`, before `max_radius`: [`progressive_scale`] of the frame where frames are
     /// accumulated, else 1.
     pub radius_scale: f32,
-    /// What is done at rims.
+    /// What is done at rims. The kernel's own area: 0.93 of the time, 0.61 of the error, and 5.6 % of the light that is lost
+    /// at edges otherwise.
     pub boundary: BoundaryCorrection,
 }
 
