@@ -7,9 +7,9 @@
 //! ```
 //!
 //! Times are medians of whole frames in which everything may have moved, of GPU timestamps where the adapter is a GPU, else on
-//! the wall. Adapters differ: what compares is time over that of a table's first row. Errors are those of indirect light, every
-//! `--average` × `--average` pixels as one, against paths traced with as many bounces, where all surfaces are diffuse; so few
-//! paths do not find caustics. What the truth's own noise hides is not shown.
+//! the wall. Adapters differ: what compares is time over that of a table's first row. Errors are those of indirect light, of means
+//! over squares of which `--means` lie along a picture's height, against paths traced with as many bounces, where all surfaces
+//! are diffuse; so few paths do not find caustics. What the truth's own noise hides is not shown.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -36,11 +36,11 @@ struct Arguments {
     /// Width and height over the paper's
     #[arg(long, default_value_t = 1.0)]
     scale: f64,
-    /// Pixels along each axis that errors are of the mean of
-    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
-    average: u32,
+    /// Squares along a picture's height that errors are of the means of
+    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    means: u32,
     /// Paths of each of these means; 0: no errors
-    #[arg(long, default_value_t = 512)]
+    #[arg(long, default_value_t = 1024)]
     samples: u32,
     /// Preset that rows are made from
     #[arg(long, default_value = "fast")]

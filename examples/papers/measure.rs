@@ -60,11 +60,12 @@ pub(crate) fn measure(
         return Ok(Err("no scene for it in --scenes".into()));
     };
     let settings = settings(arguments, row)?;
-    let step = f64::from(arguments.average);
-    let means = row
-        .size
-        .map(|side| ((f64::from(side) * arguments.scale / step).round() as u32).max(2));
-    let size = means.map(|side| side * arguments.average);
+    let side = |side: u32| f64::from(side) * arguments.scale;
+    // Pixels of a square.
+    let step = (side(row.size[1]) / f64::from(arguments.means)).round().max(1.0);
+    let means = row.size.map(|all| (side(all) / step).round().max(2.0) as u32);
+    let step = step as u32;
+    let size = means.map(|count| count * step);
     let summary = SceneSummary::of(&scene).map_err(text)?;
     let is_diffuse = summary.metals.is_empty() && summary.dielectrics.is_empty();
     let mut offline = Offline::new(gpu, scene.clone(), &settings, 0, size, Component::Indirect).map_err(text)?;
@@ -90,7 +91,7 @@ pub(crate) fn measure(
             height,
             rgb: own,
         });
-        let own = own.downsampled(arguments.average).map_err(text)?.image;
+        let own = own.downsampled(step).map_err(text)?.image;
         let key = (name, means, settings.bounces, row.widens_lights);
         if !truths.0.contains_key(&key) {
             let truth = truth(gpu, arguments, scene, key)?;

@@ -114,6 +114,8 @@ fn yao2010() -> Table {
     for (side, column) in [(512, 0), (1024, 1)] {
         for (name, triangles, [photons, caustic, bounces, maps], rates, scenes) in LINES {
             let caustic = caustic.min(MOST_CAUSTIC_PHOTONS);
+            // Without photons of other light nothing is traced.
+            let photons = photons.max(1);
             rows.push(Row {
                 name: name.into(),
                 triangles,
