@@ -40,6 +40,7 @@ fn try_draw(path: &Path, name: &str, rows: &[&Row]) -> Result<(), Box<dyn std::e
         .configure_mesh()
         .x_desc("ms a picture")
         .y_desc("relMSE")
+        .x_label_formatter(&|v| format!("{v:.0}"))
         .y_label_formatter(&|v| format!("{v:.1e}"))
         .light_line_style(WHITE)
         .draw()?;
