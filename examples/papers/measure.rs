@@ -12,6 +12,7 @@ use lightfall::reference::metrics::{self, Image, Truth};
 use lightfall::reference::{PathComponent, PathTracerSettings};
 use lightfall::scene::{LightKind, Scene, SceneSummary};
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 /// Extent of a light that is given one, over the scene's radius; of a sun in radians.
 const EXTENT: f64 = 0.02;
@@ -93,11 +94,10 @@ pub(crate) fn measure(
         });
         let own = own.downsampled(step).map_err(text)?.image;
         let key = (name, means, settings.bounces, row.widens_lights);
-        if !truths.0.contains_key(&key) {
-            let truth = truth(gpu, arguments, scene, key)?;
-            truths.0.insert(key, truth);
-        }
-        let (truth, noise) = &truths.0[&key];
+        let (truth, noise) = match truths.0.entry(key) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => entry.insert(truth(gpu, arguments, scene, key)?),
+        };
         let comparison = metrics::compare(&own, truth).map_err(text)?;
         measured.error = Some(Error {
             relmse: comparison.relmse,
