@@ -184,7 +184,7 @@ fn soft_shadows() -> Table {
             })
         });
     Table {
-        title: "Yao 2012, table 1: soft shadows and photons as quads",
+        title: "Yao et al., soft shadows and image-space photon mapping, table 1: soft shadows and photons as quads",
         hardware: "GeForce GTX 480",
         rows: rows.collect(),
         left_out: "Photons of a row are 10 000 that are emitted, which is what it says divided by bounces; kernels are as wide as density \
@@ -213,14 +213,14 @@ fn splat_shapes() -> Table {
         })
     });
     Table {
-        title: "Yao 2012, table 2: quads and volumes, hard shadows",
+        title: "Yao et al., soft shadows and image-space photon mapping, table 2: quads and volumes, hard shadows",
         hardware: "GeForce GTX 480",
         rows: rows.collect(),
         left_out: "Left out: the same with soft shadows, whose cost table 1 has.",
     }
 }
 
-/// A row of Yao's thesis: 10 000 photons emitted, traced against triangles.
+/// A row of these tables: 10 000 photons emitted, traced against triangles.
 fn splatted(
     (name, triangles, scenes): (&str, &'static str, &'static [Substitute]),
     [step, bounces]: [u32; 2],
