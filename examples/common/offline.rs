@@ -67,7 +67,7 @@ impl<'a> Offline<'a> {
         Self::with_summary(gpu, (scene, summary), settings, camera, size, component)
     }
 
-    /// The same of a scene that the renderer is told other things of than are true.
+    /// The same of a scene that the renderer is told other things of than are true, until [`Offline::set_scene`].
     pub(crate) fn with_summary(
         gpu: &'a Gpu,
         (scene, summary): (Scene, SceneSummary),

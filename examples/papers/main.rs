@@ -7,9 +7,9 @@
 //! ```
 //!
 //! Times are medians of whole frames in which everything may have moved, of GPU timestamps where the adapter is a GPU, else on
-//! the wall. Adapters differ: what compares is time over that of a table's first row. Errors are those of indirect light, of means
-//! over squares of which `--means` lie along a picture's height, against paths traced with as many bounces, where all surfaces
-//! are diffuse; so few paths do not find caustics. What the truth's own noise hides is not shown.
+//! the wall. Adapters differ: what compares is time over that of a table's first row. Errors are those of indirect light, of
+//! means over squares of which `--means` lie along a picture's height, against paths traced with as many bounces, where all
+//! surfaces are diffuse; so few paths do not find caustics. What the truth's own noise hides is not shown.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -109,7 +109,7 @@ fn line(row: &Row, measured: &Measured, [paper, own]: [f64; 2]) -> String {
     let [width, height] = measured.size;
     let (error, bias) = match &measured.error {
         Some(error) if error.is_seen() => (format!("{:.4}", error.relmse), format!("{:+.1} %", 100.0 * error.bias)),
-        Some(error) => (format!("below the truth's noise, {:.2}", error.noise), String::new()),
+        Some(error) => (format!("below the truth's noise, {:.4}", error.noise), String::new()),
         None => Default::default(),
     };
     format!(

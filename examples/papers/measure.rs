@@ -72,10 +72,6 @@ pub(crate) fn measure(
     let mut offline = Offline::new(gpu, scene.clone(), &settings, 0, size, Component::Indirect).map_err(text)?;
     let mut clock = Clock::new(gpu);
     clock.settle(gpu, &mut offline)?;
-    // Texels are gathered a few in each frame.
-    for _ in 0..offline.points.len() / settings.illumination_maps.gather.a_frame.max(1) as usize {
-        clock.frame(gpu, &mut offline)?;
-    }
     let own = offline.read().map_err(text)?;
     let mut measured = Measured {
         scene: name,

@@ -6,9 +6,10 @@
 //! cargo run --release --example tradeoff -- SCENE.glb --truth SCENE.indirect.exr --base balanced
 //! ```
 //!
-//! A point is one picture of indirect light (direct light where a knob is about shadows): the settings of `--base`, traced one
-//! way, with one knob turned. The truth is path traced once, with as many bounces as the base has, through the middle of each
-//! pixel, as passes see it; of pictures that are summed of many frames all over each pixel. Or it comes from a file.
+//! A point is one picture of indirect light (direct light where a knob is about shadows, all light where it is about metal,
+//! glass or an environment): the settings of `--base`, traced one way, with one knob turned. The truth is path traced once,
+//! with as many bounces as the base has, through the middle of each pixel, as passes see it; of pictures that are summed of
+//! many frames all over each pixel. Or it comes from a file.
 //!
 //! Written to the folder `--out`: `tradeoff.csv`, a row for each point as soon as it is measured, which is not measured again
 //! on the same adapter unless `--fresh` is given; and of all rows of each scene `NAME.svg`, error over time with the front

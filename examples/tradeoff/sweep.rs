@@ -40,12 +40,12 @@ impl Concern {
     /// Whether it is one by this tracer, which may be the first of those that are wanted.
     fn is_of(self, tracer: &str, is_first: bool) -> bool {
         match self {
-            Self::Any => true,
+            Self::Any | Self::Specular => true,
             Self::EnvMaps => tracer != "bvh",
             Self::Hybrid => tracer == "hybrid",
             Self::Triangles => tracer == "bvh",
             // They are the same whatever traces, or nearly.
-            Self::Shadows | Self::Specular | Self::Environment => is_first,
+            Self::Shadows | Self::Environment => is_first,
         }
     }
 }
@@ -119,7 +119,7 @@ const KNOBS: [Knob; 69] = {
         ("soft_shadow.blur_taps", Shadows, &["3", "5", "7", "11"]),
         ("soft_shadow.disc_taps", Shadows, &["16", "32", "128"]),
         ("soft_shadow.rays", Shadows, &["4", "16", "64"]),
-        ("soft_shadow.max_radius", Shadows, &["8", "16", "32"]),
+        ("soft_shadow.max_radius", Shadows, &["8", "32", "128"]),
         ("soft_shadow.range_scale", Shadows, &["0.5", "1", "2"]),
         ("shadow_maps.size", Shadows, &["128", "256", "512", "1024"]),
         ("caustic.photons", Specular, &["7500", "30000", "120000"]),
@@ -146,6 +146,12 @@ fn implied(knob: &str) -> &'static [(&'static str, &'static str)] {
             ("indirect.method", "surface-lights"),
             ("surface_lights.shadows", "some"),
         ],
+        // Of lights without shadows alone.
+        "surface_lights.form" | "surface_lights.threshold" => {
+            &[("indirect.method", "surface-lights"), ("surface_lights.shadows", "off")]
+        }
+        // Marches know neither.
+        "tracer.most_fetches" | "tracer.doubts_normals" => &[("tracer.method", "ordered-walk")],
         _ if knob.starts_with("surface_lights.") => &[("indirect.method", "surface-lights")],
         _ if knob.starts_with("illumination_maps.") => &[("indirect.method", "illumination-maps")],
         _ => &[],

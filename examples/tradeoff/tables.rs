@@ -98,7 +98,7 @@ fn steps(text: &mut String, rows: &[Row]) {
             "| `{}` | {} | {} → {} | × {:.2} | × {:.2} | {:+.2} → {:+.2} % |",
             b.knob,
             match b.component.as_str() {
-                "direct" | "all" => b.base.clone(),
+                "direct" => b.base.clone(),
                 _ => format!("{}, {}", b.base, b.tracer),
             },
             a.value,

@@ -79,6 +79,9 @@ const PATIENCE: [usize; 2] = [10, 640];
 /// Bounds of gains: a load that changes while the place does is taken for one.
 const GAINS: [f64; 2] = [0.25, 3.0];
 
+/// Part of a step between rungs that says anything of its gain.
+const LEAST_SHARE: f64 = 0.1;
+
 /// Least way along the ladder, as a logarithm, that says anything of gains.
 const LEAST_STEP: f64 = 0.1;
 
@@ -122,7 +125,7 @@ impl Rung {
                 rung(&fast, 240_000, [2.6, 0.69]),
                 rung(&fast, 400_000, [3.85, 0.63]),
                 rung(&balanced, 240_000, [3.9, 0.5]),
-                rung(&balanced, 500_000, [6.4, 0.34]),
+                rung(&balanced, 500_000, [6.1, 0.31]),
             ],
         }
     }
@@ -244,8 +247,12 @@ impl BudgetController {
         }
         let [low, high] = [place.min(self.place), place.max(self.place)];
         let ratio = (now - read) / expected;
-        for gain in &mut self.gains[low as usize..high.ceil() as usize] {
-            *gain = (*gain * ratio).clamp(GAINS[0], GAINS[1]);
+        for (step, gain) in self.gains.iter_mut().enumerate() {
+            // Of the step.
+            let share = (high.min(step as f64 + 1.0) - low.max(step as f64)).max(0.0);
+            if share >= LEAST_SHARE {
+                *gain = (*gain * ratio).clamp(GAINS[0], GAINS[1]);
+            }
         }
     }
 
@@ -334,7 +341,9 @@ impl BudgetController {
         let (rungs, part) = self.between(self.place);
         let [below, above] = rungs.map(|rung| &self.ladder[rung]);
         let photons = |rung: &Rung| f64::from(rung.settings.photons.max(1)).ln();
-        let between = photons(below) + part * (photons(above) - photons(below));
+        // A rung above with fewer is nearer to the truth by other settings.
+        let end = photons(below).max(photons(above));
+        let between = photons(below) + part * (end - photons(below));
         let photons = match part {
             0.0 => below.settings.photons,
             _ => between.exp().round() as u32,

@@ -146,8 +146,8 @@ pub struct TexelGatherSettings {
     /// Share of the way that shown light goes to what was gathered, each frame, above 0, at most 1: at once.
     pub blend: f32,
     /// Photons that all light at a texel is taken from, if as many lie around it on its surface: of texels with fewer, more of
-    /// the surface is taken. 0: none but its own. More are smoother and blurrier: 30 and 100 have 1.02 and 1.09 of the error of 0
-    /// in a hall of pillars.
+    /// the surface is taken. 0: none but its own. More are smoother and blurrier: 30 and 100 have 1.02 and 1.09 of the error of
+    /// 0 in a hall of pillars.
     pub least_photons: u32,
     /// Share of the rays that go where photons came from which had been scattered before, 0 to 0.95, where there are many of
     /// these, half of it where there are 128; the others are spread as the cosine.

@@ -128,8 +128,8 @@ pub enum Bandwidth {
     /// so that about `photons` of N photons lie under a kernel. Where photons are guided, divided by the sixth root of how much
     /// denser they are, if half of them are.
     Density {
-        /// k, photons under a kernel: error is least where k grows as N to the 2/3, by which noise and blur fall alike. Of 60 000
-        /// photons 200 to 400 are best in boxes and 100 in a colonnade; twice as many take up to 1.3 times as long
+        /// k, photons under a kernel: error is least where k grows as N to the 2/3, by which noise and blur fall alike. Of 60
+        /// 000 photons 200 to 400 are best in boxes and 100 in a colonnade; twice as many take up to 1.3 times as long
         /// (`docs/tradeoff.md`).
         photons: f32,
         /// Range that p̂ is clamped to.
@@ -192,8 +192,8 @@ pub struct PhotonSplatterSettings {
     /// by none of them. 0, 1 and 2 differ by 3 % of the error (`docs/tradeoff.md`).
     pub min_radius: f32,
     /// Widest kernel radius in pixels of the irradiance, up to 23: bounds the cost of a photon near the eye. Where
-    /// irradiance is sub-sampled, kernels may thus be wider by the factor. 6, 12, 23: 1.08 and 1.27 times the time and no less
-    /// error where one pixel in 4 × 4 is estimated.
+    /// irradiance is sub-sampled, kernels may thus be wider by the factor. 6, 12, 23 have the same error where one pixel in
+    /// 4 × 4 is estimated.
     pub max_radius: f32,
     /// Factor on the radius and on `min_radius`, before `max_radius`: [`progressive_scale`] of the frame where frames are
     /// accumulated, else 1.

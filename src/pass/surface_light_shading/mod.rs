@@ -109,13 +109,13 @@ pub enum IndirectShadows {
 /// Speed against accuracy, settable every frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceLightShadingSettings {
-    /// Near by. Discs instead of points: 0.70 of the error in a hall of pillars for 1.6 times the time, most of that for photons
-    /// near by; squares 0.74 for no more (`docs/tradeoff.md`).
+    /// Near by. Discs instead of points: 0.70 of the error in a hall of pillars, with photons near by; squares 0.74
+    /// (`docs/tradeoff.md`).
     pub shape: LightShape,
     /// Without shadows. All of them give the same picture; `docs/surface_lights.md` has their times.
     pub form: LightForm,
-    /// What stands in the way. Ambient occlusion 0.38 of the error without, rays to some of the lights 0.32, to all 0.15; for
-    /// 1.03, 1.14, 1.4 times the time.
+    /// What stands in the way. Ambient occlusion 0.38 of the error without, rays to some of the lights 0.31, to all 0.15
+    /// (`docs/tradeoff.md`; `docs/surface_lights.md` has times).
     pub shadows: IndirectShadows,
     /// Rays of a pixel, from 1, for `AmbientOcclusion` and `Some`. Cost grows in proportion; noise falls as the root.
     pub rays: u32,
