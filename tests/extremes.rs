@@ -7,7 +7,7 @@ mod common;
 use common::{Component, Gpu, Offline, Reference, assert_no_errors, gpu};
 use lightfall::frame::Settings;
 use lightfall::glam::{DAffine3, DVec3};
-use lightfall::reference::metrics::{self, Image, Truth};
+use lightfall::reference::metrics::{self, Image};
 use lightfall::reference::{PathComponent, PathTracerSettings};
 use lightfall::scene::{LightKind, Scene, samples};
 
@@ -186,15 +186,11 @@ fn far_from_the_origin_errors_are_at_most_twice_the_nominal_ones() {
             ..Default::default()
         };
         let mut reference = Reference::new(&gpu, scene.clone(), &paths, 0, SIZE).unwrap();
-        let estimate = reference.trace(256).unwrap();
+        let truth = reference.truth(256).unwrap();
         let image = |rgb| Image {
             width: SIZE[0],
             height: SIZE[1],
             rgb,
-        };
-        let truth = Truth {
-            standard_error: Some(estimate.standard_error),
-            ..Truth::new(image(estimate.mean))
         };
         let error = |scene: &Scene| {
             let rgb = picture(&gpu, scene, &settings, Component::Indirect);

@@ -2,7 +2,7 @@
 
 use super::adapter::Gpu;
 use lightfall::glam::{DAffine3, DVec3};
-use lightfall::reference::metrics::Truth;
+use lightfall::reference::metrics::{Image, Truth};
 use lightfall::reference::{
     Emitters, PathEstimate, PathTracer, PathTracerInputs, PathTracerResources, PathTracerSettings,
 };
@@ -105,6 +105,19 @@ impl<'a> Reference<'a> {
             self.render_sample(None)?;
         }
         self.read()
+    }
+
+    /// The same, as what pictures are compared with.
+    pub(crate) fn truth(&mut self, samples: u32) -> Result<Truth, Error> {
+        let estimate = self.trace(samples)?;
+        Ok(Truth {
+            standard_error: Some(estimate.standard_error),
+            ..Truth::new(Image {
+                width: self.size[0],
+                height: self.size[1],
+                rgb: estimate.mean,
+            })
+        })
     }
 
     /// Traces one more path for each pixel and waits for them.

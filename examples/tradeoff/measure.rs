@@ -169,11 +169,7 @@ impl<'a> Subject<'a> {
         };
         let size = [self.arguments.size; 2];
         let mut reference = Reference::new(self.gpu, self.scene.clone(), &paths, 0, size).map_err(|e| e.to_string())?;
-        let estimate = reference.trace(self.arguments.samples).map_err(|e| e.to_string())?;
-        Ok(Truth {
-            standard_error: Some(estimate.standard_error),
-            ..Truth::new(self.image(estimate.mean))
-        })
+        reference.truth(self.arguments.samples).map_err(|e| e.to_string())
     }
 }
 

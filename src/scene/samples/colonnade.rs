@@ -1,6 +1,6 @@
 //! The colonnade: a long hall under the open sky, with thin balusters in great number.
 
-use super::solids::{band, joined, lathe, moved, rounded_box, sheet, shifted};
+use super::solids::{band, half_circle, joined, lathe, moved, rounded_box, sheet, shifted};
 use super::{Builder, cuboid};
 use crate::scene::{Light, LightKind, Material, Mesh, Scene};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
@@ -149,28 +149,24 @@ fn columns(builder: &mut Builder, stone: usize) {
     }
 }
 
-/// Half a circle from left to right over the origin.
-fn half_circle(radius: f64) -> Vec<[f64; 2]> {
-    (0..=ARCH_PIECES)
-        .map(|i| {
-            let (sin, cos) = (PI * (1.0 - f64::from(i) / f64::from(ARCH_PIECES))).sin_cos();
-            [radius * cos, radius * sin]
-        })
-        .collect()
-}
-
 /// The wall of a bay around its arch, up to this height over where the arch springs from.
 fn spandrel(height: f64) -> Mesh {
     let half = 0.5 * BAY - CLEARANCE;
     let mut lower = vec![[-half, 0.0]];
-    lower.extend(half_circle(OPENING));
+    lower.extend(half_circle(OPENING, ARCH_PIECES));
     lower.push([half, 0.0]);
     let upper: Vec<_> = lower.iter().map(|p| [p[0], height]).collect();
     band(&lower, &upper, [-WALL_DEPTH, WALL_DEPTH])
 }
 
 fn arches(builder: &mut Builder, stone: usize, plaster: usize) {
-    let rings = RINGS.map(|[inner, outer, depth]| band(&half_circle(inner), &half_circle(outer), [-depth, depth]));
+    let rings = RINGS.map(|[inner, outer, depth]| {
+        band(
+            &half_circle(inner, ARCH_PIECES),
+            &half_circle(outer, ARCH_PIECES),
+            [-depth, depth],
+        )
+    });
     let arch = builder.shape(joined("arch", rings));
     for [_, spring, top] in STOREYS {
         let wall = Mesh {

@@ -1,6 +1,6 @@
 //! The nave: a vaulted church between its aisles, closed on all sides and lit by a single spot.
 
-use super::solids::{band, joined, lathe, moved, rod, rounded_box, sheet, shifted};
+use super::solids::{band, half_circle, joined, lathe, moved, rod, rounded_box, sheet, shifted};
 use super::{Builder, cuboid};
 use crate::scene::{Light, LightKind, Material, Mesh, Scene};
 use glam::{DAffine3, DQuat, DVec3};
@@ -156,16 +156,6 @@ fn piers(builder: &mut Builder, stone: usize) {
             builder.place(upper, stone, DAffine3::from_translation(on_wall));
         }
     }
-}
-
-/// Half a circle from left to right over the origin.
-fn half_circle(radius: f64, pieces: u32) -> Vec<[f64; 2]> {
-    (0..=pieces)
-        .map(|i| {
-            let (sin, cos) = (PI * (1.0 - f64::from(i) / f64::from(pieces))).sin_cos();
-            [radius * cos, radius * sin]
-        })
-        .collect()
 }
 
 /// Arches between the piers, the wall over them up to the vault, and the roofs of the aisles.

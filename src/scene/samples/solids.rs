@@ -115,6 +115,16 @@ pub(super) fn band(lower: &[[f64; 2]], upper: &[[f64; 2]], [near, far]: [f64; 2]
     mesh
 }
 
+/// Half a circle of so many straight pieces, from left to right over the origin.
+pub(super) fn half_circle(radius: f64, pieces: u32) -> Vec<[f64; 2]> {
+    (0..=pieces)
+        .map(|i| {
+            let (sin, cos) = (PI * (1.0 - f64::from(i) / f64::from(pieces))).sin_cos();
+            [radius * cos, radius * sin]
+        })
+        .collect()
+}
+
 /// A strip of cloth or paper of this thickness along a line of (x, z) points that runs along +X, from y = 0 to `height`.
 pub(super) fn sheet(line: &[[f64; 2]], thickness: f64, height: f64) -> Mesh {
     // In the plane of `band`, y points along −z here.
