@@ -4,7 +4,7 @@
 //! cargo run --release --example plan_study
 //! ```
 //!
-//! Six scenes, planned by what is in them, and as a host would have to that cannot tell (`SceneSummary::presuming_all`; of the
+//! Seven scenes, planned by what is in them, and as a host would have to that cannot tell (`SceneSummary::presuming_all`; of the
 //! last one, which stands still, every frame as if it moved). Passes are counted, bytes are those of the renderer and of a
 //! view; the difference between both pictures is the root of the mean square over the mean.
 
@@ -16,8 +16,10 @@ use common::arguments;
 use common::clock::median;
 use common::offline::{Component, Offline};
 use lightfall::frame::{Plan, Settings};
-use lightfall::scene::{Scene, SceneSummary, samples};
+use lightfall::glam::{DAffine3, DVec3};
+use lightfall::scene::{Instance, Projection, Scene, SceneSummary, samples};
 use lightfall::{Error, Timestamps};
+use std::f64::consts::PI;
 use std::time::Instant;
 
 /// Prints what planning saves.
@@ -101,6 +103,17 @@ fn scenes() -> Vec<(&'static str, Scene, bool)> {
     let is_block = |scene: &Scene, mesh: usize| scene.meshes[mesh].name.contains("block");
     let all = std::mem::take(&mut box_alone.instances);
     box_alone.instances = all.into_iter().filter(|i| !is_block(&box_alone, i.mesh)).collect();
+    // A front wall, and the eye before it.
+    let mut closed = box_alone.clone();
+    let back = closed.instances.iter().position(|i| i.name == "back wall").unwrap_or(0);
+    let (middle, depth) = (2.78, 5.592);
+    closed.instances.push(Instance {
+        name: "front wall".into(),
+        transform: DAffine3::from_translation(DVec3::new(2.0 * middle, 0.0, depth)) * DAffine3::from_rotation_y(PI),
+        ..closed.instances[back].clone()
+    });
+    closed.cameras[0].transform.translation = DVec3::new(middle, 2.73, 0.1);
+    closed.cameras[0].projection = Projection::Perspective { fov_y: 0.5 * PI };
     let mut black = cornell();
     for material in &mut black.materials {
         material.base_color = [0.0; 3];
@@ -108,7 +121,8 @@ fn scenes() -> Vec<(&'static str, Scene, bool)> {
     }
     vec![
         ("no light", empty, false),
-        ("an empty box, one bulb", box_alone, false),
+        ("a box, open at its front", box_alone, false),
+        ("a closed box", closed, false),
         ("nothing specular", cornell(), false),
         ("a ball of glass", samples::glass_sphere(0.0), false),
         ("all black", black, false),

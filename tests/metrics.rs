@@ -93,6 +93,24 @@ fn ten_percent_too_bright_is_a_bias_of_a_tenth() -> Result<(), Error> {
 }
 
 #[test]
+fn the_worst_hundredth_can_be_left_out() -> Result<(), Error> {
+    let truth = Truth::new(uniform(20, 10, 4.0));
+    let with_outliers = |count: usize| {
+        let mut image = uniform(20, 10, 5.0);
+        image.rgb[7..7 + count].fill([400.0; 3]);
+        compare(&image, &truth)
+    };
+    // Two of 200.
+    for (outliers, left) in [(0, 0.0), (2, 0.0), (3, 99.0 * 99.0 - 0.25 * 0.25)] {
+        let comparison = with_outliers(outliers)?;
+        let expected = (0.25 * 0.25 + left / 198.0) * GUARDED;
+        assert_relative_eq!(comparison.relmse_trimmed, expected, max_relative = 1e-12);
+        assert!(outliers == 0 || comparison.relmse > 40.0);
+    }
+    Ok(())
+}
+
+#[test]
 fn each_channel_has_its_own_bias() -> Result<(), Error> {
     let image = Image {
         width: 1,

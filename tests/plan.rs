@@ -89,12 +89,7 @@ fn a_volume_takes_the_photons_of_a_sun_to_itself() {
     // What lies around the box lights it, too.
     let margin = DVec3::new(12.0, 0.0, 12.0);
     let bounds = SceneBounds::new(own.bounds.min - margin, own.bounds.max + margin).unwrap();
-    let ground = bounds.max - bounds.min;
-    let volume = SceneSummary {
-        bounds,
-        area: own.area + ground.x * ground.z,
-        ..whole.clone()
-    };
+    let volume = SceneSummary::of_part(&scene, bounds).unwrap();
     let settings = Settings {
         photons: 100_000,
         tracer_kind: TracerKind::Bvh,

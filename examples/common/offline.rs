@@ -76,11 +76,37 @@ impl<'a> Offline<'a> {
         size: [u32; 2],
         component: Component,
     ) -> Result<Self, Error> {
+        let renderer = GiRenderer::new(&gpu.device, settings)?;
+        Self::with_renderer(gpu, (scene, summary), renderer, camera, size, component)
+    }
+
+    /// The same of another scene, with the pipelines that are there already, as far as settings share them.
+    pub(crate) fn another(
+        &self,
+        scene: Scene,
+        settings: &Settings,
+        size: [u32; 2],
+        component: Component,
+    ) -> Result<Self, Error> {
+        let summary = SceneSummary::of(&scene)?;
+        let mut renderer = self.renderer.another()?;
+        renderer.set_settings(settings)?;
+        Self::with_renderer(self.gpu, (scene, summary), renderer, 0, size, component)
+    }
+
+    fn with_renderer(
+        gpu: &'a Gpu,
+        (scene, summary): (Scene, SceneSummary),
+        mut renderer: GiRenderer,
+        camera: usize,
+        size: [u32; 2],
+        component: Component,
+    ) -> Result<Self, Error> {
         let (device, queue) = (&gpu.device, &gpu.queue);
+        let settings = &renderer.settings().clone();
         let mut geometry = MeshGeometry::new(device, queue, &scene)?;
         let bvh = || BvhGeometry::new(device, queue, &scene, &BvhGeometryConfig::default());
         let bvh = settings.uses_triangles().then(bvh).transpose()?;
-        let mut renderer = GiRenderer::new(device, settings)?;
         renderer.set_environment(queue, scene.environment_image())?;
         renderer.set_scene(queue, &summary, &scene.lights)?;
         renderer.place_env_maps_blocking(queue, &mut geometry)?;
@@ -298,6 +324,7 @@ impl<'a> Offline<'a> {
         }
         // Nothing but photons and kernels may change, environment maps stay where they are.
         let in_motion = std::mem::replace(&mut self.in_motion, false);
+        let first = self.pictures_before;
         let mut pair = |settings: &Settings| {
             self.set_settings(settings)?;
             let mut picture = |number| {
@@ -305,11 +332,11 @@ impl<'a> Offline<'a> {
                 self.render_frame(None)?;
                 self.read()
             };
-            Ok::<_, Error>([picture(0)?, picture(1)?])
+            Ok::<_, Error>([picture(first)?, picture(first.wrapping_add(1))?])
         };
         let own = pair(&settings)?;
         let widened = pair(&ErrorEstimate::widened(&settings))?;
-        self.pictures_before = 0;
+        self.pictures_before = first;
         self.in_motion = in_motion;
         self.set_settings(&settings)?;
         ErrorEstimate::of([&own[0], &own[1]], [&widened[0], &widened[1]]).map(Some)

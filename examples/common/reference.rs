@@ -10,6 +10,7 @@ use lightfall::resource::{BvhGeometry, BvhGeometryConfig, Radiance};
 use lightfall::scene::{Camera, Projection, Scene, SceneSummary, UnitFrame};
 use lightfall::{Error, Timestamps};
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::sync::Arc;
 
 /// The preset that is no `Settings`.
 pub(crate) const PRESET: &str = "reference";
@@ -19,7 +20,7 @@ pub(crate) const SAMPLES: u32 = 256;
 /// A scene on the GPU and what its paths have brought so far.
 pub(crate) struct Reference<'a> {
     gpu: &'a Gpu,
-    tracer: PathTracer,
+    tracer: Arc<PathTracer>,
     resources: PathTracerResources,
     geometry: BvhGeometry,
     emitters: Emitters,
@@ -39,6 +40,21 @@ impl<'a> Reference<'a> {
         camera: usize,
         size: [u32; 2],
     ) -> Result<Self, Error> {
+        Self::with_tracer(gpu, Arc::new(PathTracer::new(&gpu.device)), scene, settings, (camera, size))
+    }
+
+    /// The same of another scene, with the pipelines that are there already.
+    pub(crate) fn another(&self, scene: Scene, settings: &PathTracerSettings, size: [u32; 2]) -> Result<Self, Error> {
+        Self::with_tracer(self.gpu, Arc::clone(&self.tracer), scene, settings, (0, size))
+    }
+
+    fn with_tracer(
+        gpu: &'a Gpu,
+        tracer: Arc<PathTracer>,
+        scene: Scene,
+        settings: &PathTracerSettings,
+        (camera, size): (usize, [u32; 2]),
+    ) -> Result<Self, Error> {
         let (device, queue) = (&gpu.device, &gpu.queue);
         let summary = SceneSummary::of(&scene)?;
         let frame = UnitFrame::new(&summary.bounds, summary.total_flux)?;
@@ -46,7 +62,7 @@ impl<'a> Reference<'a> {
         geometry.prepare(queue, &frame)?;
         Ok(Self {
             gpu,
-            tracer: PathTracer::new(device),
+            tracer,
             resources: PathTracerResources::new(device, size)?,
             geometry,
             emitters: Emitters::new(device, queue, &frame, &scene)?,

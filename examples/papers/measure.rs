@@ -28,6 +28,8 @@ pub(crate) struct Measured {
 
 pub(crate) struct Error {
     pub(crate) relmse: f64,
+    /// Without its largest hundredth.
+    pub(crate) trimmed: f64,
     pub(crate) bias: f64,
     /// What relMSE of the truth would be, against itself.
     pub(crate) noise: f64,
@@ -97,6 +99,7 @@ pub(crate) fn measure(
         let comparison = metrics::compare(&own, truth).map_err(text)?;
         measured.error = Some(Error {
             relmse: comparison.relmse,
+            trimmed: comparison.relmse_trimmed,
             bias: comparison.bias,
             noise: *noise,
         });

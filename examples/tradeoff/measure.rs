@@ -8,7 +8,7 @@ use crate::common::reference::Reference;
 use crate::common::truth_file;
 use crate::rows::Row;
 use crate::sweep::{Concern, Point};
-use lightfall::frame::Settings;
+use lightfall::frame::{IndirectMethod, Settings};
 use lightfall::pass::HopStatistics;
 use lightfall::reference::metrics::{self, Image, Truth};
 use lightfall::reference::{PathComponent, PathTracerSettings};
@@ -85,6 +85,9 @@ impl<'a> Subject<'a> {
         }
         let own = offline.read().map_err(|e| e.to_string())?;
         if point.settings.frames == 1 {
+            for _ in 0..frames_gathering(&point.settings) {
+                offline.render_frame(None).map_err(|e| e.to_string())?;
+            }
             for _ in 0..self.arguments.rounds {
                 clock.frame(self.gpu, &mut offline)?;
             }
@@ -170,6 +173,15 @@ impl<'a> Subject<'a> {
         let size = [self.arguments.size; 2];
         let mut reference = Reference::new(self.gpu, self.scene.clone(), &paths, 0, size).map_err(|e| e.to_string())?;
         reference.truth(self.arguments.samples).map_err(|e| e.to_string())
+    }
+}
+
+/// Frames until an illumination map has gathered each texel, on both sides, three more times: until then it still gathers.
+fn frames_gathering(settings: &Settings) -> u32 {
+    let own = &settings.illumination_maps;
+    match settings.indirect_method {
+        IndirectMethod::IlluminationMaps => (6 * own.texels).div_ceil(own.gather.a_frame.max(1)),
+        _ => 0,
     }
 }
 

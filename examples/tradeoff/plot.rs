@@ -42,7 +42,8 @@ fn try_draw(path: &Path, name: &str, rows: &[&Row]) -> Result<(), Box<dyn std::e
         .y_desc("relMSE")
         .x_label_formatter(&|v| format!("{v:.0}"))
         .y_label_formatter(&|v| format!("{v:.1e}"))
-        .light_line_style(WHITE)
+        .light_line_style(BLACK.mix(0.06))
+        .max_light_lines(8)
         .draw()?;
     for (tracer, color) in TRACERS {
         let own = || rows.iter().filter(|r| r.tracer == tracer);

@@ -7,7 +7,7 @@ use crate::pass::{
     ShadowMapCaptureResources,
 };
 use crate::resource::{CaptureView, Lights, NearestOccluders, ShadowMaps};
-use crate::scene::Light;
+use crate::scene::{Light, UnitFrame};
 
 /// From geometry to what shadows are found by.
 #[derive(Debug)]
@@ -22,6 +22,8 @@ pub(super) struct DirectScene {
     pub(super) lights: Lights,
     pub(super) shadow_maps: ShadowMaps,
     layers: u32,
+    /// What the shadow maps show, as far as lights go; `None`: nothing that lasts.
+    captured: Option<(UnitFrame, Vec<Light>)>,
     capture: ShadowMapCaptureResources,
     /// While penumbrae are looked for.
     nearest: Option<(NearestOccluders, NearestOccluderResources)>,
@@ -46,6 +48,7 @@ impl DirectScene {
             lights: own,
             shadow_maps: ShadowMaps::new(device, lights, settings.shadow_map_size)?,
             layers: ShadowMaps::layers(lights),
+            captured: None,
             capture: ShadowMapCaptureResources::new(device, settings.shadow_map_size)?,
             nearest: None,
         })
@@ -61,6 +64,7 @@ impl DirectScene {
         if !plan.is_on(Stage::SoftShadow) {
             self.nearest = None;
         } else if self.nearest.is_none() {
+            self.captured = None;
             let nearest = NearestOccluders::new(device, self.layers)?;
             self.nearest = Some((nearest, NearestOccluderResources::new(device)?));
         }
@@ -70,6 +74,23 @@ impl DirectScene {
     /// While penumbrae are looked for.
     pub(super) fn nearest(&self) -> Option<&NearestOccluders> {
         self.nearest.as_ref().map(|n| &n.0)
+    }
+
+    /// Whether what the lights see was captured of lights like these. Otherwise what there is is void, until it is captured.
+    pub(super) fn holds(&mut self, frame: &UnitFrame, lights: &[Light]) -> bool {
+        let is_like = |(own, seen): &(UnitFrame, Vec<Light>)| own.maps_like(frame) && seen == lights;
+        self.captured = self.captured.take().filter(is_like);
+        self.captured.is_some()
+    }
+
+    /// Says that geometry is other than it was captured.
+    pub(super) fn forget(&mut self) {
+        self.captured = None;
+    }
+
+    /// Notes that what these lights see was recorded.
+    pub(super) fn recorded(&mut self, frame: &UnitFrame, lights: &[Light]) {
+        self.captured = Some((*frame, lights.to_vec()));
     }
 
     /// Records what the lights see, through these views.

@@ -38,6 +38,7 @@ use crate::scene::{
 use crate::{Error, Timestamps};
 use glam::DVec3;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// All passes and the resources that views share.
@@ -45,7 +46,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub struct GiRenderer {
     device: wgpu::Device,
     settings: Settings,
-    passes: Passes,
+    /// Of all renderers that share them.
+    passes: Arc<Passes>,
     black: Irradiance,
     environment: Environment,
     environment_image: Option<EnvironmentImage>,
@@ -67,6 +69,8 @@ pub struct GiRenderer {
     /// All views of the frame, indexed; the last `prepare` filled it.
     views: Vec<CaptureView>,
     light_views: std::ops::Range<usize>,
+    /// Whether shadow maps show this frame already.
+    keeps_shadows: bool,
     env_map_views: std::ops::Range<usize>,
     recapture: Recapture,
     /// Layers of the environment maps that this frame captures.
@@ -204,10 +208,23 @@ impl GiRenderer {
     /// [`Error::InvalidSetting`], [`Error::MissingFeatures`].
     pub fn new(device: &wgpu::Device, settings: &Settings) -> Result<Self, Error> {
         settings.validate()?;
+        Self::with_passes(device, settings, Arc::new(Passes::new(device, settings)?))
+    }
+
+    /// A renderer of another scene, or of the same one apart, with the settings and the pipelines of this one: they are most of
+    /// what [`GiRenderer::new`] takes its time for. Nothing else is shared.
+    ///
+    /// # Errors
+    /// None that [`GiRenderer::new`] did not have.
+    pub fn another(&self) -> Result<Self, Error> {
+        Self::with_passes(&self.device, &self.settings, Arc::clone(&self.passes))
+    }
+
+    fn with_passes(device: &wgpu::Device, settings: &Settings, passes: Arc<Passes>) -> Result<Self, Error> {
         Ok(Self {
             device: device.clone(),
             settings: settings.clone(),
-            passes: Passes::new(device, settings)?,
+            passes,
             black: Irradiance::new(device, [1, 1], wgpu::TextureFormat::Rgba32Float)?,
             environment: Environment::black(device)?,
             environment_image: None,
@@ -224,6 +241,7 @@ impl GiRenderer {
             revision: 0,
             views: Vec::new(),
             light_views: 0..0,
+            keeps_shadows: false,
             env_map_views: 0..0,
             recapture: Recapture::default(),
             env_map_layers: Vec::new(),
@@ -250,7 +268,7 @@ impl GiRenderer {
             return Ok(());
         }
         if !settings.share_pipelines(old) {
-            self.passes = Passes::new(&self.device, settings)?;
+            self.passes = Arc::new(Passes::new(&self.device, settings)?);
         }
         let shadows = |s: &Settings| (s.shadow_map_size, s.selects_photons());
         if shadows(settings) != shadows(old) {
@@ -563,7 +581,7 @@ impl GiRenderer {
     }
 
     /// Says where geometry, or what it looks like, has changed since the last frame, so that only those faces of
-    /// environment maps are captured that may show it; `&[]`: nowhere. Of an object that moved both its old box and its new
+    /// environment maps are captured that may show it; `&[]`: nowhere, and shadow maps stay as well, as long as lights do. Of an object that moved both its old box and its new
     /// one are wanted. It counts for the next `prepare`, adds to what was said before it, and includes
     /// [`GiRenderer::geometry_changed`] where there is a change. In frames without a word of it everything is captured. A
     /// frame that was recorded has to be submitted, or its changes are missed.
@@ -596,8 +614,15 @@ impl GiRenderer {
         self.views.clear();
         self.views.extend(cameras.iter().map(|c| c.capture));
         let lights_from = self.views.len();
-        if let Some(direct) = &self.direct {
-            self.views.extend(direct.shadow_maps.views(&state.frame, &state.lights));
+        self.keeps_shadows = false;
+        if let Some(direct) = &mut self.direct {
+            if !self.recapture.is_still() {
+                direct.forget();
+            }
+            self.keeps_shadows = direct.holds(&state.frame, &state.lights);
+            if !self.keeps_shadows {
+                self.views.extend(direct.shadow_maps.views(&state.frame, &state.lights));
+            }
         }
         let maps_from = self.views.len();
         let env_maps = self.indirect.as_ref().and_then(IndirectScene::env_maps);
@@ -879,9 +904,10 @@ impl GiRenderer {
     }
 
     fn record_shadow_maps(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) {
-        if let (Some(direct), Some(state)) = (&mut self.direct, &self.state) {
+        if let (Some(direct), Some(state), false) = (&mut self.direct, &self.state, self.keeps_shadows) {
             let views = &self.views[self.light_views.clone()];
             direct.record(encoder, &self.passes.shadows, (inputs, &state.plan, views));
+            direct.recorded(&state.frame, &state.lights);
         }
     }
 

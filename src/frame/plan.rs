@@ -90,7 +90,7 @@ pub struct PlannedStage {
 pub struct Plan {
     /// All stages in the order of a frame.
     pub stages: Vec<PlannedStage>,
-    /// What the scene has that is not modelled yet, and what is done instead.
+    /// What the host keeps from light, and what the scene has that is not modelled yet, with what is done instead.
     pub simplifications: Vec<String>,
 }
 
@@ -439,7 +439,7 @@ fn sums(lit: &(bool, String), settings: &Settings) -> [(bool, String); 3] {
 fn simplifications(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
     let specular: Vec<_> = summary.metals.iter().chain(&summary.dielectrics).cloned().collect();
     let list = |names: &[String]| names.join(", ");
-    let mut notes = Vec::new();
+    let mut notes = left_out(summary, settings);
     if !summary.emissive.is_empty() && summary.emissive_triangles.is_empty() {
         notes.push(format!(
             "shine for the eye alone, light nothing: {}",
@@ -506,6 +506,25 @@ fn simplifications(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
     notes
 }
 
+/// What the host keeps from light.
+fn left_out(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
+    let has_indirect = indirect(summary, settings).0;
+    let mut notes = Vec::new();
+    if summary.is_part && has_indirect {
+        notes.push("light fills a part of the scene: what lies outside gets no photons of suns and no environment maps".into());
+    }
+    if summary.out_of_env_maps > 0 && has_indirect {
+        notes.push(format!(
+            "{} instance(s) that neither photons nor environment maps see",
+            summary.out_of_env_maps
+        ));
+    }
+    if summary.without_shadow > 0 && is_lit(summary, settings) {
+        notes.push(format!("{} instance(s) without a shadow", summary.without_shadow));
+    }
+    notes
+}
+
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for stage in &self.stages {
@@ -530,7 +549,10 @@ mod tests {
         SceneSummary {
             bounds: SceneBounds::new(DVec3::ZERO, DVec3::ONE).unwrap(),
             area: 6.0,
+            is_part: false,
             triangles: 12,
+            out_of_env_maps: 0,
+            without_shadow: 0,
             total_flux: 1.0,
             lights: 1,
             environment_lights: 0,
@@ -687,6 +709,23 @@ mod tests {
         assert!(!on(&[], &[ball], 10));
         assert!(!on(&["chrome"], &[], 10));
         assert!(!on(&["chrome"], &[ball], 0));
+    }
+
+    #[test]
+    fn what_the_host_leaves_out_is_named() {
+        let summary = SceneSummary {
+            is_part: true,
+            out_of_env_maps: 3,
+            without_shadow: 2,
+            ..summary()
+        };
+        let count = |lights| {
+            let summary = SceneSummary { lights, ..summary.clone() };
+            let text = Plan::for_scene(&summary, &Settings::balanced()).to_string();
+            let notes = ["a part of the scene", "3 instance(s) that neither", "2 instance(s) without"];
+            notes.iter().filter(|note| text.contains(*note)).count()
+        };
+        assert_eq!((count(1), count(0)), (3, 0));
     }
 
     #[test]

@@ -26,6 +26,11 @@ impl Recapture {
         self.changes.get_or_insert_default().extend_from_slice(changes);
     }
 
+    /// Whether the host said that nothing changed since the last frame.
+    pub(super) fn is_still(&self) -> bool {
+        self.changes.as_ref().is_some_and(Vec::is_empty)
+    }
+
     /// Layers to capture this frame, in order; what has changed is taken.
     pub(super) fn layers(&mut self, frame: &UnitFrame, centers: &[Vec3]) -> Vec<u32> {
         let changes = self.changes.take();

@@ -265,6 +265,9 @@ pub struct Comparison {
     pub pixels: usize,
     /// Relative mean squared error with the reference's own variance taken out (see the [module](self)). No unit.
     pub relmse: f64,
+    /// The same without the hundredth of the pixels that have the largest: what single pixels on the wrong side of an edge of
+    /// something dark do not decide.
+    pub relmse_trimmed: f64,
     /// Energy bias: mean x / mean r − 1 over all channels. 0.02 is two percent too bright.
     pub bias: f64,
     /// Energy bias of red, green and blue. Means nothing in a channel that is black in the reference.
@@ -290,6 +293,7 @@ impl Comparison {
             finite: false,
             pixels: self.pixels,
             relmse: f64::NAN,
+            relmse_trimmed: f64::NAN,
             bias: f64::NAN,
             bias_rgb: [f64::NAN; 3],
             rmse: f64::NAN,
@@ -379,6 +383,7 @@ fn measure(image: &Image, truth: &Truth, compared: &[usize], reference_mean: [f6
         finite: true,
         pixels: compared.len(),
         relmse: over_compared(&relmse).unwrap_or(f64::NAN),
+        relmse_trimmed: mean(without_largest(compared.iter().map(|&pixel| relmse(pixel)).collect())).unwrap_or(f64::NAN),
         bias: average(image_mean) / scale - 1.0,
         bias_rgb: [0, 1, 2].map(|c| image_mean[c] / reference_mean[c].max(BLACK_CHANNEL * scale) - 1.0),
         rmse: over_compared(&|pixel| squared_error(image, truth, pixel))
@@ -389,6 +394,13 @@ fn measure(image: &Image, truth: &Truth, compared: &[usize], reference_mean: [f6
         relmse_edge: split(true),
         relmse_interior: split(false),
     }
+}
+
+/// All but the largest hundredth, rounded down.
+fn without_largest(mut values: Vec<f64>) -> impl Iterator<Item = f64> {
+    values.sort_by(f64::total_cmp);
+    values.truncate(values.len() - values.len() / 100);
+    values.into_iter()
 }
 
 /// ((x − r)² − σ²) / (r² + (0.01 · mean r)²) of a pixel, averaged over its channels.

@@ -1,0 +1,19 @@
+//! What scenes, lights, views and settings may go to: the rows of `docs/extremes.md`. Each method of indirect light, each tracer,
+//! each shadow renders small pictures of it, of which every value is finite; its error stays within twice that of the nominal
+//! case, or it is refused with a named error.
+#![cfg(all(feature = "bvh", feature = "reference"))]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod device;
+mod geometry;
+mod light;
+mod maps;
+mod material;
+mod motion;
+mod photons;
+mod properties;
+mod scale;
+mod studio;
+mod view;
