@@ -40,7 +40,13 @@ impl<'a> Reference<'a> {
         camera: usize,
         size: [u32; 2],
     ) -> Result<Self, Error> {
-        Self::with_tracer(gpu, Arc::new(PathTracer::new(&gpu.device)), scene, settings, (camera, size))
+        Self::with_tracer(
+            gpu,
+            Arc::new(PathTracer::new(&gpu.device)),
+            scene,
+            settings,
+            (camera, size),
+        )
     }
 
     /// The same of another scene, with the pipelines that are there already.

@@ -511,7 +511,9 @@ fn left_out(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
     let has_indirect = indirect(summary, settings).0;
     let mut notes = Vec::new();
     if summary.is_part && has_indirect {
-        notes.push("light fills a part of the scene: what lies outside gets no photons of suns and no environment maps".into());
+        notes.push(
+            "light fills a part of the scene: what lies outside gets no photons of suns and no environment maps".into(),
+        );
     }
     if summary.out_of_env_maps > 0 && has_indirect {
         notes.push(format!(
@@ -720,9 +722,16 @@ mod tests {
             ..summary()
         };
         let count = |lights| {
-            let summary = SceneSummary { lights, ..summary.clone() };
+            let summary = SceneSummary {
+                lights,
+                ..summary.clone()
+            };
             let text = Plan::for_scene(&summary, &Settings::balanced()).to_string();
-            let notes = ["a part of the scene", "3 instance(s) that neither", "2 instance(s) without"];
+            let notes = [
+                "a part of the scene",
+                "3 instance(s) that neither",
+                "2 instance(s) without",
+            ];
             notes.iter().filter(|note| text.contains(*note)).count()
         };
         assert_eq!((count(1), count(0)), (3, 0));

@@ -383,7 +383,8 @@ fn measure(image: &Image, truth: &Truth, compared: &[usize], reference_mean: [f6
         finite: true,
         pixels: compared.len(),
         relmse: over_compared(&relmse).unwrap_or(f64::NAN),
-        relmse_trimmed: mean(without_largest(compared.iter().map(|&pixel| relmse(pixel)).collect())).unwrap_or(f64::NAN),
+        relmse_trimmed: mean(without_largest(compared.iter().map(|&pixel| relmse(pixel)).collect()))
+            .unwrap_or(f64::NAN),
         bias: average(image_mean) / scale - 1.0,
         bias_rgb: [0, 1, 2].map(|c| image_mean[c] / reference_mean[c].max(BLACK_CHANNEL * scale) - 1.0),
         rmse: over_compared(&|pixel| squared_error(image, truth, pixel))

@@ -167,7 +167,12 @@ impl SceneSummary {
     pub fn of_part(scene: &Scene, part: SceneBounds) -> Result<Self, Error> {
         let whole = Self::of(scene)?;
         let area_within = |t: [DVec3; 3]| clipped_area(&t, &part);
-        let area = scene.instances.iter().flat_map(|i| triangles(scene, i)).map(area_within).sum();
+        let area = scene
+            .instances
+            .iter()
+            .flat_map(|i| triangles(scene, i))
+            .map(area_within)
+            .sum();
         if area <= 0.0 {
             let problem = format!("from {} to {} holds no surface of the scene", part.min, part.max);
             return Err(Error::scene("summary", "scene", "part", problem));
@@ -192,7 +197,11 @@ fn flux(scene: &Scene, radius: f64) -> f64 {
     };
     let of_surfaces: f64 = scene.instances.iter().map(of_surface).sum();
     let of_light = |light| scene.flux_of(light, radius).element_sum();
-    scene.lights.iter().map(of_light).fold(of_surfaces, |sum, own| sum + own)
+    scene
+        .lights
+        .iter()
+        .map(of_light)
+        .fold(of_surfaces, |sum, own| sum + own)
 }
 
 fn specular_bounds(scene: &Scene) -> Vec<BoundingSphere> {
@@ -222,7 +231,9 @@ fn triangles<'a>(scene: &'a Scene, instance: &'a Instance) -> impl Iterator<Item
         let p = Vec3::from(mesh.positions[i as usize]).as_dvec3();
         instance.transform.transform_point3(p)
     };
-    mesh.indices.chunks_exact(3).map(move |t| [t[0], t[1], t[2]].map(corner))
+    mesh.indices
+        .chunks_exact(3)
+        .map(move |t| [t[0], t[1], t[2]].map(corner))
 }
 
 /// Of a flat, convex one.

@@ -19,7 +19,11 @@ fn a_device_lost_between_frames_is_an_error_and_a_new_one_renders_the_same() {
             // What is recorded for a device that is gone goes nowhere; whatever reads it back says so.
             let rendered = offline.render_frame(None);
             let read = offline.read();
-            assert!(matches!(read, Err(Error::ReadBack { .. })), "{:?}", read.map(|rgb| rgb.len()));
+            assert!(
+                matches!(read, Err(Error::ReadBack { .. })),
+                "{:?}",
+                read.map(|rgb| rgb.len())
+            );
             println!("a frame on a lost device: {rendered:?}; reading it: {read:?}");
             return Some(Vec::new());
         }
@@ -47,13 +51,15 @@ fn after_what_does_not_fit_the_next_frame_is_as_before() {
         };
         let before = frames(&mut offline);
         let mut too_many = Settings {
-            photons: 50_000_000,
+            photons: 10_000_000,
             ..good.clone()
         };
-        too_many.surface_lights.pool = 50_000_000;
+        too_many.surface_lights.pool = 10_000_000;
         let is_refused = match offline.set_settings(&too_many) {
             Err(error) => panic!("{}: {error}", way.name),
-            Ok(()) => matches!(offline.render_frame(None), Err(Error::LimitExceeded { needed, limit, .. }) if needed > limit),
+            Ok(()) => {
+                matches!(offline.render_frame(None), Err(Error::LimitExceeded { needed, limit, .. }) if needed > limit)
+            }
         };
         assert!(is_refused, "{}", way.name);
         offline.set_settings(&good).unwrap();
@@ -63,9 +69,17 @@ fn after_what_does_not_fit_the_next_frame_is_as_before() {
         let worst = worst.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         println!("{}: {worst:e}", way.name);
         // A view of no size, and of one that no device has.
-        for size in [[0, 4], [4, 0], [u32::MAX, 1], [1, gpu.device.limits().max_texture_dimension_2d + 1]] {
+        for size in [
+            [0, 4],
+            [4, 0],
+            [u32::MAX, 1],
+            [1, gpu.device.limits().max_texture_dimension_2d + 1],
+        ] {
             let refused = offline.renderer.resize_view(&mut offline.view, size);
-            assert!(matches!(refused, Err(Error::LimitExceeded { .. })), "{size:?}: {refused:?}");
+            assert!(
+                matches!(refused, Err(Error::LimitExceeded { .. })),
+                "{size:?}: {refused:?}"
+            );
         }
         assert!(before == after && frames(&mut offline) == after, "{}", way.name);
         assert_no_errors(&gpu);

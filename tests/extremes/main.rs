@@ -1,6 +1,6 @@
-//! What scenes, lights, views and settings may go to: the rows of `docs/extremes.md`. Each method of indirect light, each tracer,
+//! What scenes, lights, views and settings may go to: one row after the other. Each method of indirect light, each tracer,
 //! each shadow renders small pictures of it, of which every value is finite; its error stays within twice that of the nominal
-//! case, or it is refused with a named error.
+//! case, or it is refused with a named error. Rows that are ignored are open, or take minutes: `-- --ignored`.
 #![cfg(all(feature = "bvh", feature = "reference"))]
 
 #[path = "../common/mod.rs"]

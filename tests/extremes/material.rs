@@ -1,7 +1,7 @@
 //! Surfaces that take all light, or none, and metal and glass between smooth and rough.
 
 use crate::common::{Component, assert_no_errors};
-use crate::studio::{METHODS, SIZE, WAYS, Studio, assert_finite, by_name, mean, studio};
+use crate::studio::{METHODS, SIZE, Studio, WAYS, assert_finite, by_name, mean, studio};
 use lightfall::reference::PathComponent;
 use lightfall::scene::{Material, Scene, samples};
 
@@ -45,6 +45,7 @@ fn surfaces_may_take_all_light_or_none() {
 
 /// Means of all light against that of paths, which do not find caustics of a bulb: a lamp with an extent lights the box.
 #[test]
+#[ignore = "takes minutes"]
 fn metal_and_glass_may_be_smooth_rough_and_of_any_density() {
     let Some(mut studio) = studio() else { return };
     let Some(studio) = studio.as_mut() else { return };
@@ -75,7 +76,12 @@ fn metal_and_glass_may_be_smooth_rough_and_of_any_density() {
             let of = |studio: &mut Studio, component| studio.picture(&way, &[], &scene, SIZE, component).unwrap();
             let all = of(studio, Component::All);
             assert_finite(&all, row);
-            println!("| {row} | {} | {:.4} | paths {:.4} |", way.name, mean(&all), mean(&truth.image.rgb));
+            println!(
+                "| {row} | {} | {:.4} | paths {:.4} |",
+                way.name,
+                mean(&all),
+                mean(&truth.image.rgb)
+            );
         }
         for way in METHODS.map(by_name) {
             let all = studio.picture(&way, &[], &scene, SIZE, Component::All).unwrap();

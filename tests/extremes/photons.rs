@@ -1,7 +1,7 @@
 //! How many photons and bounces, and where they end.
 
 use crate::common::{Component, assert_no_errors};
-use crate::studio::{METHODS, SIZE, Studio, WAYS, assert_finite, box_lit_by, by_name, mean, report, error_of, studio};
+use crate::studio::{METHODS, SIZE, Studio, WAYS, assert_finite, box_lit_by, by_name, error_of, mean, report, studio};
 use lightfall::Error;
 use lightfall::glam::DVec3;
 use lightfall::reference::PathComponent;
@@ -18,6 +18,10 @@ fn photons_may_be_none_one_and_too_many() {
         assert!(way.sample != "cornell" || mean(&none) == 0.0, "{}", way.name);
         assert_finite(&none, way.name);
         assert_finite(&with("1", Component::All).unwrap(), way.name);
+        // A pool has as many as it says itself.
+        if way.name == "surface lights" {
+            continue;
+        }
         match with("10000000", Component::All) {
             Err(Error::LimitExceeded { .. }) => {}
             other => panic!("{}: ten million photons: {:?}", way.name, other.map(|rgb| mean(&rgb))),
@@ -60,8 +64,15 @@ fn light_may_bounce_never_once_and_many_times() {
             mean(&rgb)
         };
         let [none, one, three, many] = ["0", "1", "3", "64"].map(&mut with);
-        println!("| bounces 0, 1, 3, 64 | {} | {none:.4}, {one:.4}, {three:.4}, {many:.4} | |", way.name);
-        assert!(none == 0.0 && one > 0.0 && one < three && three < 1.05 * many, "{}", way.name);
+        println!(
+            "| bounces 0, 1, 3, 64 | {} | {none:.4}, {one:.4}, {three:.4}, {many:.4} | |",
+            way.name
+        );
+        assert!(
+            none == 0.0 && one > 0.0 && one < three && three < 1.05 * many,
+            "{}",
+            way.name
+        );
         // Albedos of 0.73 at most leave little after a few bounces: no energy is made.
         assert!(many < 1.6 * three, "{}", way.name);
     }
@@ -70,6 +81,7 @@ fn light_may_bounce_never_once_and_many_times() {
 
 /// Stored flux is at most what albedos leave, however few the photons.
 #[test]
+#[ignore = "takes minutes"]
 fn few_photons_are_noisy_and_right_in_the_mean() {
     let Some(mut studio) = studio() else { return };
     let Some(studio) = studio.as_mut() else { return };
@@ -78,7 +90,9 @@ fn few_photons_are_noisy_and_right_in_the_mean() {
     let way = by_name("triangles");
     let nominal = studio.nominal(&way);
     let rgb = |studio: &mut Studio, photons: &str| {
-        studio.picture(&way, &[("photons", photons)], &scene, SIZE, Component::Indirect).unwrap()
+        studio
+            .picture(&way, &[("photons", photons)], &scene, SIZE, Component::Indirect)
+            .unwrap()
     };
     let more = rgb(studio, "40000");
     report("40 000 photons", way.name, error_of(more, SIZE, &truth), nominal);

@@ -87,7 +87,12 @@ fn far_from_the_origin_errors_are_at_most_twice_the_nominal_ones() {
         for sizes in [1e6, 1e8] {
             let far = moved(&scene, 10.0 * sizes * DVec3::new(0.6, -0.3, 0.7));
             let rgb = studio.picture(way, &[], &far, SIZE, Component::Indirect).unwrap();
-            report(&format!("{sizes:.0e} sizes away"), way.name, error_of(rgb, SIZE, &truth), nominal);
+            report(
+                &format!("{sizes:.0e} sizes away"),
+                way.name,
+                error_of(rgb, SIZE, &truth),
+                nominal,
+            );
         }
     }
     assert_no_errors(studio.gpu);

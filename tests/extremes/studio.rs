@@ -206,7 +206,11 @@ impl Studio {
             let sample = samples::cornell(0.0);
             Reference::new(self.gpu, sample, &paths, 0, SIZE).unwrap()
         });
-        first.another(scene.clone(), &paths, size).unwrap().truth(SAMPLES).unwrap()
+        first
+            .another(scene.clone(), &paths, size)
+            .unwrap()
+            .truth(SAMPLES)
+            .unwrap()
     }
 
     /// relMSE of indirect light in the box as it is.
@@ -217,7 +221,9 @@ impl Studio {
         let scene = samples::cornell(0.3);
         let truth = self.truth(&scene, SIZE, PathComponent::Indirect);
         for name in WAYS.iter().filter(|w| w.sample == "cornell").map(|w| w.name) {
-            let rgb = self.picture(&by_name(name), &[], &scene, SIZE, Component::Indirect).unwrap();
+            let rgb = self
+                .picture(&by_name(name), &[], &scene, SIZE, Component::Indirect)
+                .unwrap();
             let error = error_of(rgb, SIZE, &truth);
             self.nominal.push((name, error));
         }
@@ -244,7 +250,7 @@ pub(crate) fn error_of(rgb: Vec<[f32; 3]>, [width, height]: [u32; 2], truth: &Tr
     comparison.relmse
 }
 
-/// A line of `docs/extremes.md`, which holds.
+/// Prints a row, which holds.
 pub(crate) fn report(row: &str, way: &str, error: f64, nominal: f64) {
     println!("| {row} | {way} | {error:.4} | {nominal:.4} |");
     assert!(error <= 2.0 * nominal, "{row}, {way}: {error} instead of {nominal}");
