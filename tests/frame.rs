@@ -54,10 +54,20 @@ fn record(
     (device, queue): (&wgpu::Device, &wgpu::Queue),
 ) -> wgpu::CommandEncoder {
     let summary = SceneSummary::of(scene).unwrap();
+    record_as_told(renderer, view, (geometry, bvh), (scene, &summary), (device, queue))
+}
+
+fn record_as_told(
+    renderer: &mut GiRenderer,
+    view: &mut ViewResources,
+    (geometry, bvh): (&mut MeshGeometry, &mut BvhGeometry),
+    (scene, summary): (&Scene, &SceneSummary),
+    (device, queue): (&wgpu::Device, &wgpu::Queue),
+) -> wgpu::CommandEncoder {
     if let Some(image) = scene.environment_image() {
         renderer.set_environment(queue, Some(image)).unwrap();
     }
-    let frame = renderer.set_scene(queue, &summary, &scene.lights).unwrap();
+    let frame = renderer.set_scene(queue, summary, &scene.lights).unwrap();
     bvh.prepare(queue, &frame).unwrap();
     let size = view.g_buffer().size();
     let mut cameras = [CameraView::new(&frame, &scene.cameras[0], size, [0.0; 2])];
@@ -803,6 +813,126 @@ fn only_what_may_have_changed_is_captured_again_and_no_pixel_tells() {
     assert_eq!([passes[1], passes[4]], [always[0].0 - 19 - 6; 2]);
     assert!(passes[2] < always[0].0 - 4 && passes[2] > passes[1] + 6 + 1);
     assert_ne!(wanted[1].1, wanted[3].1, "the block moved");
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn shadow_maps_that_stay_are_those_of_what_there_is() {
+    let Some(gpu) = gpu() else { return };
+    let gpus = (&gpu.device, &gpu.queue);
+    let (device, queue) = gpus;
+    let settings = |search: &str| {
+        let mut settings = Settings {
+            tracer_kind: TracerKind::Bvh,
+            ..small()
+        };
+        settings.set("soft_shadow.search", search).unwrap();
+        settings
+    };
+    let mut scene = samples::cornell(0.0);
+    let LightKind::Point { position, .. } = scene.lights[0].kind else {
+        panic!("the lamp of the box is a point");
+    };
+    scene.lights[0].kind = LightKind::Point { position, radius: 0.4 };
+    scene.lights.push(Light {
+        name: "sun".into(),
+        kind: LightKind::Directional {
+            direction: DVec3::new(0.1, -0.2, 1.0).normalize(),
+            angle: 0.05,
+        },
+        color: [1.0; 3],
+        intensity: 2.0,
+    });
+    let mut turned = scene.clone();
+    turned.lights[1].kind = LightKind::Directional {
+        direction: DVec3::new(-0.2, -0.3, 1.0).normalize(),
+        angle: 0.05,
+    };
+    let mut wider = turned.clone();
+    wider.lights[0].kind = LightKind::Point { position, radius: 0.8 };
+    let mut dimmed = wider.clone();
+    dimmed.lights[1].intensity = 1.0;
+    let summary = SceneSummary::of(&dimmed).unwrap();
+    let mut grown = summary.clone();
+    grown.bounds = SceneBounds::new(summary.bounds.min, summary.bounds.max + DVec3::splat(0.8)).unwrap();
+    // What is said of each frame, and whether anything of it stays.
+    let said = |scene: &Scene| (scene.clone(), SceneSummary::of(scene).unwrap());
+    let frames = [
+        (said(&scene), "on", false),
+        (said(&scene), "on", true),
+        (said(&turned), "on", false),
+        (said(&wider), "on", false),
+        (said(&dimmed), "on", true),
+        ((dimmed.clone(), grown.clone()), "on", false),
+        ((dimmed.clone(), grown.clone()), "off", false),
+        ((dimmed.clone(), grown), "on", false),
+    ];
+    let images = |says_that_nothing_moved: bool| {
+        let mut geometry = MeshGeometry::new(device, queue, &scene).unwrap();
+        let mut bvh = triangles(device, queue, &scene);
+        let mut renderer = GiRenderer::new(device, &settings("on")).unwrap();
+        let mut view = renderer.new_view([32, 32]).unwrap();
+        let render = |((scene, summary), search, _): &((Scene, SceneSummary), &str, bool)| {
+            renderer.set_settings(&settings(search)).unwrap();
+            if says_that_nothing_moved {
+                renderer.set_changes(&[]);
+            }
+            let before = creation_count().passes;
+            let both = (&mut geometry, &mut bvh);
+            let encoder = record_as_told(&mut renderer, &mut view, both, (scene, summary), gpus);
+            let passes = creation_count().passes - before;
+            queue.submit([encoder.finish()]);
+            let image = read_rgba32float_blocking(device, queue, view.radiance().view().texture()).unwrap();
+            (passes, image)
+        };
+        frames.iter().map(render).collect::<Vec<_>>()
+    };
+    let (always, wanted) = (images(false), images(true));
+    for (index, ((all, some), (_, _, stays))) in always.iter().zip(&wanted).zip(&frames).enumerate() {
+        assert!(all.1 == some.1, "frame {index}");
+        // Six faces of the bulb and the sun's, and what stands nearest before them.
+        let left_out = all.0 - some.0;
+        assert_eq!(left_out >= 7, *stays, "frame {index}: {left_out} passes fewer");
+    }
+    assert_no_errors(&gpu);
+}
+
+#[test]
+fn shadow_maps_of_a_frame_that_was_refused_do_not_count_as_captured() {
+    let Some(gpu) = gpu() else { return };
+    let (device, queue) = (&gpu.device, &gpu.queue);
+    let scene = samples::cornell(0.0);
+    let summary = SceneSummary::of(&scene).unwrap();
+    let mut geometry = MeshGeometry::new(device, queue, &scene).unwrap();
+    let mut bvh = triangles(device, queue, &scene);
+    let settings = Settings {
+        tracer_kind: TracerKind::Bvh,
+        ..small()
+    };
+    let mut image = |is_refused_first: bool| {
+        let mut renderer = GiRenderer::new(device, &settings).unwrap();
+        let mut view = renderer.new_view([16, 16]).unwrap();
+        if is_refused_first {
+            renderer.set_scene(queue, &summary, &scene.lights).unwrap();
+            renderer.set_changes(&[]);
+            renderer.prepare(queue, &mut geometry, &mut []).unwrap();
+            let inputs = SceneInputs {
+                queue,
+                geometry: &geometry,
+                bvh: None,
+                sample_offset: 0,
+                timestamps: None,
+            };
+            let mut encoder = device.create_command_encoder(&Default::default());
+            assert!(renderer.record_scene(&mut encoder, &inputs).is_err());
+            renderer.set_changes(&[]);
+        }
+        let both = (&mut geometry, &mut bvh);
+        let encoder = record(&mut renderer, &mut view, both, &scene, (device, queue));
+        queue.submit([encoder.finish()]);
+        read_rgba32float_blocking(device, queue, view.radiance().view().texture()).unwrap()
+    };
+    assert!(image(true) == image(false));
     assert_no_errors(&gpu);
 }
 

@@ -29,9 +29,7 @@ fn bandwidth_narrowing(b: Bandwidth, photon: Photon) -> f32 {
 // Radius of a photon's kernel, unit frame (Yao et al. 2010, section 6, made dimensionless by area and pdf); by BANDWIDTH_BIN that
 // of a photon of uniform density.
 fn bandwidth_radius(b: Bandwidth, photon: Photon) -> f32 {
-    if b.rule != BANDWIDTH_DENSITY {
-        return b.scale;
-    }
     let density = clamp(photon.density / b.uniform, b.lowest, b.highest);
-    return b.scale * inverseSqrt(density) * bandwidth_narrowing(b, photon);
+    let narrowed = b.scale * inverseSqrt(density) * bandwidth_narrowing(b, photon);
+    return select(b.scale, narrowed, b.rule == BANDWIDTH_DENSITY);
 }

@@ -74,9 +74,7 @@ fn g_buffer_geometric_normal(view: View, pixel: vec2i, p: vec3f, around: Neighbo
 fn g_buffer_normal(view: View, texel: vec4f) -> vec3f {
     let half_offset = (view.normal_encoding & 1u) == 1u;
     let v = select(texel.xyz, 2.0 * texel.xyz - 1.0, half_offset);
-    if view.normal_encoding >= 2u {
-        return octahedral_decode(v.xy);
-    }
     let length_squared = dot(v, v);
-    return select(vec3f(0.0, 1.0, 0.0), v * inverseSqrt(length_squared), length_squared > 0.0);
+    let direction = select(vec3f(0.0, 1.0, 0.0), v * inverseSqrt(length_squared), length_squared > 0.0);
+    return select(direction, octahedral_decode(v.xy), view.normal_encoding >= 2u);
 }

@@ -7,7 +7,8 @@ use crate::pass::{
     ShadowMapCaptureResources,
 };
 use crate::resource::{CaptureView, Lights, NearestOccluders, ShadowMaps};
-use crate::scene::{Light, UnitFrame};
+use crate::scene::{Light, LightKind, UnitFrame};
+use glam::DVec3;
 
 /// From geometry to what shadows are found by.
 #[derive(Debug)]
@@ -16,14 +17,25 @@ pub(super) struct ShadowPasses {
     nearest_occluder: NearestOccluder,
 }
 
+/// What the maps of lights show, as far as it is not geometry.
+#[derive(Debug, PartialEq)]
+struct Shown {
+    frame: UnitFrame,
+    /// Of each light, and whether it shines.
+    lights: Vec<(LightKind, bool)>,
+    has_nearest: bool,
+}
+
 /// Allocated while anything shines.
 #[derive(Debug)]
 pub(super) struct DirectScene {
     pub(super) lights: Lights,
     pub(super) shadow_maps: ShadowMaps,
     layers: u32,
-    /// What the shadow maps show, as far as lights go; `None`: nothing that lasts.
-    captured: Option<(UnitFrame, Vec<Light>)>,
+    /// What was recorded last; `None`: nothing that lasts.
+    shown: Option<Shown>,
+    /// What is to be recorded; `None`: what is there stays.
+    planned: Option<Shown>,
     capture: ShadowMapCaptureResources,
     /// While penumbrae are looked for.
     nearest: Option<(NearestOccluders, NearestOccluderResources)>,
@@ -48,7 +60,8 @@ impl DirectScene {
             lights: own,
             shadow_maps: ShadowMaps::new(device, lights, settings.shadow_map_size)?,
             layers: ShadowMaps::layers(lights),
-            captured: None,
+            shown: None,
+            planned: None,
             capture: ShadowMapCaptureResources::new(device, settings.shadow_map_size)?,
             nearest: None,
         })
@@ -64,7 +77,7 @@ impl DirectScene {
         if !plan.is_on(Stage::SoftShadow) {
             self.nearest = None;
         } else if self.nearest.is_none() {
-            self.captured = None;
+            self.forget();
             let nearest = NearestOccluders::new(device, self.layers)?;
             self.nearest = Some((nearest, NearestOccluderResources::new(device)?));
         }
@@ -76,30 +89,44 @@ impl DirectScene {
         self.nearest.as_ref().map(|n| &n.0)
     }
 
-    /// Whether what the lights see was captured of lights like these. Otherwise what there is is void, until it is captured.
-    pub(super) fn holds(&mut self, frame: &UnitFrame, lights: &[Light]) -> bool {
-        let is_like = |(own, seen): &(UnitFrame, Vec<Light>)| own.maps_like(frame) && seen == lights;
-        self.captured = self.captured.take().filter(is_like);
-        self.captured.is_some()
-    }
-
-    /// Says that geometry is other than it was captured.
+    /// Says that geometry is other than it was recorded.
     pub(super) fn forget(&mut self) {
-        self.captured = None;
+        self.shown = None;
     }
 
-    /// Notes that what these lights see was recorded.
-    pub(super) fn recorded(&mut self, frame: &UnitFrame, lights: &[Light]) {
-        self.captured = Some((*frame, lights.to_vec()));
+    /// The views that this frame records: none while what is there is of the same lights and, as the host says, geometry.
+    pub(super) fn plan(&mut self, (frame, lights): (&UnitFrame, &[Light]), plan: &Plan) -> Vec<CaptureView> {
+        let wanted = Shown {
+            frame: *frame,
+            lights: lights.iter().map(|l| (l.kind, l.strength() != DVec3::ZERO)).collect(),
+            has_nearest: plan.is_on(Stage::NearestOccluder),
+        };
+        if self.shown.as_ref() == Some(&wanted) {
+            self.planned = None;
+            return Vec::new();
+        }
+        self.shown = None;
+        self.planned = Some(wanted);
+        self.shadow_maps.views(frame, lights)
     }
 
-    /// Records what the lights see, through these views.
+    /// Notes that all that was recorded is going to be submitted.
+    pub(super) fn recorded(&mut self) {
+        if let Some(planned) = self.planned.take() {
+            self.shown = Some(planned);
+        }
+    }
+
+    /// Records what the lights see, through the views that were planned.
     pub(super) fn record(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
         passes: &ShadowPasses,
         (inputs, plan, views): (&SceneInputs<'_>, &Plan, &[CaptureView]),
     ) {
+        if self.planned.is_none() {
+            return;
+        }
         let shadow_inputs = ShadowMapCaptureInputs {
             shadow_maps: &self.shadow_maps,
             geometry: inputs.geometry,

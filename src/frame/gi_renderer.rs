@@ -69,8 +69,6 @@ pub struct GiRenderer {
     /// All views of the frame, indexed; the last `prepare` filled it.
     views: Vec<CaptureView>,
     light_views: std::ops::Range<usize>,
-    /// Whether shadow maps show this frame already.
-    keeps_shadows: bool,
     env_map_views: std::ops::Range<usize>,
     recapture: Recapture,
     /// Layers of the environment maps that this frame captures.
@@ -241,7 +239,6 @@ impl GiRenderer {
             revision: 0,
             views: Vec::new(),
             light_views: 0..0,
-            keeps_shadows: false,
             env_map_views: 0..0,
             recapture: Recapture::default(),
             env_map_layers: Vec::new(),
@@ -573,18 +570,21 @@ impl GiRenderer {
     }
 
     /// Says that geometry has moved, appeared or gone since the last frame: the selection of places for environment maps
-    /// is then kept up to date until it comes to rest. Call it before `prepare`; a change of the region is noticed without
-    /// it.
+    /// is then kept up to date until it comes to rest, and shadow maps are captured anew. Call it before `prepare`; a change of
+    /// the region is noticed without it.
     pub fn geometry_changed(&mut self) {
         self.revision += 1;
+        if let Some(direct) = &mut self.direct {
+            direct.forget();
+        }
         self.placement.geometry_changed();
     }
 
     /// Says where geometry, or what it looks like, has changed since the last frame, so that only those faces of
-    /// environment maps are captured that may show it; `&[]`: nowhere, and shadow maps stay as well, as long as lights do. Of an object that moved both its old box and its new
-    /// one are wanted. It counts for the next `prepare`, adds to what was said before it, and includes
-    /// [`GiRenderer::geometry_changed`] where there is a change. In frames without a word of it everything is captured. A
-    /// frame that was recorded has to be submitted, or its changes are missed.
+    /// environment maps are captured that may show it; `&[]`: nowhere, and shadow maps stay as well, as long as lights and the
+    /// unit frame do. Of an object that moved both its old box and its new one are wanted. It counts for the next `prepare`,
+    /// adds to what was said before it, and includes [`GiRenderer::geometry_changed`] where there is a change. In frames
+    /// without a word of it everything is captured. A frame that was recorded has to be submitted, or its changes are missed.
     pub fn set_changes(&mut self, changes: &[SceneBounds]) {
         self.recapture.set_changes(changes);
         if !changes.is_empty() {
@@ -614,15 +614,12 @@ impl GiRenderer {
         self.views.clear();
         self.views.extend(cameras.iter().map(|c| c.capture));
         let lights_from = self.views.len();
-        self.keeps_shadows = false;
         if let Some(direct) = &mut self.direct {
             if !self.recapture.is_still() {
                 direct.forget();
             }
-            self.keeps_shadows = direct.holds(&state.frame, &state.lights);
-            if !self.keeps_shadows {
-                self.views.extend(direct.shadow_maps.views(&state.frame, &state.lights));
-            }
+            self.views
+                .extend(direct.plan((&state.frame, &state.lights), &state.plan));
         }
         let maps_from = self.views.len();
         let env_maps = self.indirect.as_ref().and_then(IndirectScene::env_maps);
@@ -863,6 +860,9 @@ impl GiRenderer {
             self.recapture.recorded();
             self.photons_frame = Some(state.frame);
         }
+        if let Some(direct) = &mut self.direct {
+            direct.recorded();
+        }
         Ok(())
     }
 
@@ -904,10 +904,9 @@ impl GiRenderer {
     }
 
     fn record_shadow_maps(&mut self, encoder: &mut wgpu::CommandEncoder, inputs: &SceneInputs<'_>) {
-        if let (Some(direct), Some(state), false) = (&mut self.direct, &self.state, self.keeps_shadows) {
+        if let (Some(direct), Some(state)) = (&mut self.direct, &self.state) {
             let views = &self.views[self.light_views.clone()];
             direct.record(encoder, &self.passes.shadows, (inputs, &state.plan, views));
-            direct.recorded(&state.frame, &state.lights);
         }
     }
 

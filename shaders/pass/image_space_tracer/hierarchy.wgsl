@@ -111,7 +111,7 @@ fn hierarchy_crossing(found: MapTrace, is_certain: bool, ray: FaceRay, cell: vec
     let is_sure = depth_range_agrees(bits, u32(in_texel.x > 0.5) + 2u * u32(in_texel.y > 0.5));
     if is_certain && is_sure {
         result.kind = HIT_SURFACE;
-        if params.doubts_normals == 1u && !depth_range_is_flat(bits) {
+        if !depth_range_is_flat(bits) && params.doubts_normals == 1u {
             result.hit.kind = HIT_TENTATIVE;
         }
     } else if is_certain {

@@ -14,7 +14,7 @@ const ORDERED_LEAST_WINDOW: f32 = 0x1p-8;
 // The map after `last` in order of (distance, index) to a point; params.map_count if there is none.
 fn ordered_next_map(p: vec3f, last: vec2f) -> vec2f {
     var next = vec2f(1e30, f32(params.map_count));
-    for (var map = 0u; map < params.map_count; map++) {
+    for (var map = 0u; map < min(params.map_count, arrayLength(&centers)); map++) {
         let candidate = vec2f(distance(p, centers[map].xyz), f32(map));
         let is_later = candidate.x > last.x || (candidate.x == last.x && candidate.y > last.y);
         if is_later && candidate.x < next.x && trace_is_on(map) {
@@ -95,13 +95,9 @@ fn ordered_trace(origin: vec3f, normal: vec3f, r: vec3f) -> Hit {
     var tentative_reach = 0.0;
     var is_known = false;
     for (var round = 0u; round < 2u && !is_known && (only_knowing || round == 0u); round++) {
-        var ordered = vec2f(-1.0, -1.0);
-        for (var i = 0u; i < params.map_count; i++) {
-            ordered = ordered_next_map(origin, ordered);
+        var ordered = ordered_next_map(origin, vec2f(-1.0, -1.0));
+        for (; u32(ordered.y) < params.map_count; ordered = ordered_next_map(origin, ordered)) {
             let map = u32(ordered.y);
-            if map >= params.map_count {
-                break;
-            }
             let center = centers[map].xyz;
             let x = origin - center;
             let knows = ordered_knows(map, x, normal, r, free);

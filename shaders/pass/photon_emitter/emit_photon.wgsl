@@ -27,7 +27,7 @@ fn emit(light: Light, u: vec2f) -> Emission {
 
 fn light_of(photon: u32) -> u32 {
     var index = 0u;
-    while index + 1u < params.light_count && photon >= lights[index].first_photon + lights[index].photon_count {
+    while photon >= lights[index].first_photon + lights[index].photon_count && index + 1u < params.light_count {
         index++;
     }
     return index;

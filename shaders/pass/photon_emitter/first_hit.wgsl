@@ -50,14 +50,14 @@ fn polygon_of(light: Light, u: f32) -> u32 {
 
 // Whether photons start on a surface, flat or round, with a cosine's spread.
 fn starts_on_surface(light: Light) -> bool {
-    return light.kind == LIGHT_AREA || (params.traces_first == 1u && light.kind == LIGHT_POINT && light.extent > 0.0);
+    return light.kind == LIGHT_AREA || (light.kind == LIGHT_POINT && light.extent > 0.0 && params.traces_first == 1u);
 }
 
 // One of the points that a spot's disc, or of the directions that a sun's, is made of; it sends out what all of them do. A shadow
 // map knows their middle alone.
 fn light_within(light: Light, sequence_index: u32) -> Light {
     var own = light;
-    if params.traces_first == 0u || light.extent <= 0.0 {
+    if light.extent <= 0.0 || params.traces_first == 0u {
         return own;
     }
     let place = random_recurrence(sequence_index);
@@ -129,7 +129,7 @@ fn photon_started(start: SurfaceStart, light_index: u32, direction: vec3f, boost
 
 // On a ray of a light that is not flat; `pdf`: of photons along it, per solid angle or per perpendicular area (directional).
 fn photon_on_ray(light_index: u32, ray: LightRay, pdf: f32, flux: vec3f, kept: u32) -> Photon {
-    if params.traces_first == 0u {
+    if pdf > 0.0 && params.traces_first == 0u {
         return photon_landed(light_index, ray, pdf, flux, kept);
     }
     let direction = octahedral_pack(ray.direction);

@@ -46,7 +46,7 @@ fn splat_radius(b: Bandwidth, photon: Photon) -> f32 {
         return 0.0;
     }
     var h = bandwidth_radius(b, photon);
-    if b.rule == BANDWIDTH_BIN {
+    if h > 0.0 && b.rule == BANDWIDTH_BIN {
         h *= inverseSqrt(clamp(bin_density(b, photon) / b.uniform, b.lowest, b.highest));
     }
     h = min(max(h, splat_pixels(b.min_radius, photon)), splat_pixels(b.max_radius, photon));

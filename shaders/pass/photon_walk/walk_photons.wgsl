@@ -108,7 +108,7 @@ fn next_photon(photon: Photon, flux: vec3f, bounce: u32, sequence_index: u32) ->
     var u = random_pair(sequence_index, 2u * bounce);
     var boost = 1.0;
     var origin = photon;
-    if walk.guided > 0.0 && photon_goes_by_tables(photon.state) {
+    if photon_goes_by_tables(photon.state) && walk.guided > 0.0 {
         let table = reflection_table(photon.position, normal);
         let is_guided = (photon.state & PHOTON_IS_GUIDED) != 0u;
         if is_guided {
@@ -150,12 +150,13 @@ fn first_photon(start: Photon) -> Photon {
 fn walk_path(index: u32) {
     let sequence_index = walk.sample_offset + index;
     let scattered_from = max(walk.first_hop, 1u);
+    let last = min(walk.last_hop, arrayLength(&photons) / walk.photon_count - 1u);
     var photon = photons[(scattered_from - 1u) * walk.photon_count + index];
-    if walk.first_hop == 0u && (photon.state & PHOTON_STARTED) != 0u {
+    if (photon.state & PHOTON_STARTED) != 0u && walk.first_hop == 0u {
         photon = first_photon(photon);
         photons[index] = photon;
     }
-    for (var bounce = scattered_from; bounce <= walk.last_hop; bounce++) {
+    for (var bounce = scattered_from; bounce <= last; bounce++) {
         let slot = bounce * walk.photon_count + index;
         let lobe = photon_lobe(photon.state, photon.light_and_surface);
         let is_specular = lobe_is_specular(lobe);
@@ -176,7 +177,7 @@ fn walk_path(index: u32) {
             continue;
         }
         if is_specular {
-            let is_caustic = walk.map == PHOTON_MAP_GLOBAL && (photon.state & (PHOTON_FIRST_HIT | PHOTON_CAUSTIC)) != 0u;
+            let is_caustic = (photon.state & (PHOTON_FIRST_HIT | PHOTON_CAUSTIC)) != 0u && walk.map == PHOTON_MAP_GLOBAL;
             photon = next_specular(photon, flux, scattering);
             photon.state |= select(0u, PHOTON_CAUSTIC, is_caustic);
         } else {
