@@ -517,7 +517,7 @@ fn left_out(summary: &SceneSummary, settings: &Settings) -> Vec<String> {
     }
     if summary.out_of_env_maps > 0 && has_indirect {
         notes.push(format!(
-            "{} instance(s) that neither photons nor environment maps see",
+            "{} instance(s) in no environment map: photons pass through them, but for first hits in shadow maps",
             summary.out_of_env_maps
         ));
     }
@@ -729,7 +729,7 @@ mod tests {
             let text = Plan::for_scene(&summary, &Settings::balanced()).to_string();
             let notes = [
                 "a part of the scene",
-                "3 instance(s) that neither",
+                "3 instance(s) in no environment map",
                 "2 instance(s) without",
             ];
             notes.iter().filter(|note| text.contains(*note)).count()

@@ -15,7 +15,8 @@ pub struct Instance {
     pub material: usize,
     /// Mesh to world, `f64`. Mirroring transforms are fine: the front face follows.
     pub transform: DAffine3,
-    /// Whether environment maps see it. Small or far decoration that need not reflect light may stay out of them.
+    /// Whether environment maps show it, and traced photons meet it. Small or far decoration that need not reflect light may
+    /// stay out.
     pub in_env_maps: bool,
     /// Whether it blocks direct light.
     pub casts_shadow: bool,

@@ -10,14 +10,14 @@ use std::f64::consts::PI;
 pub struct SceneSummary {
     /// The region that light should fill. It may be a part of the scene (`docs/plan.md` says what that saves).
     pub bounds: SceneBounds,
-    /// Whether it is one. Nothing but the plan's text depends on it.
+    /// Whether it leaves something out. Nothing but the plan's text depends on it.
     pub is_part: bool,
     /// Area of all surfaces in it, one side counted, world units squared.
     pub area: f64,
     /// Triangles over all instances.
     pub triangles: usize,
-    /// Instances that neither environment maps nor photons see ([`Instance::in_env_maps`]). It is
-    /// the geometry that leaves them out, the plan only says so; as it does of the next.
+    /// Instances that environment maps do not show, and traced photons pass through ([`Instance::in_env_maps`]), wherever they
+    /// stand. It is the geometry that leaves them out, the plan only says so; as it does of the next.
     pub out_of_env_maps: usize,
     /// Instances without a shadow ([`Instance::casts_shadow`]).
     pub without_shadow: usize,
@@ -160,7 +160,8 @@ impl SceneSummary {
     }
 
     /// Reads it off a scene of which light should fill a part: photons of suns start over it alone, environment maps stand in
-    /// it, kernels are as wide as the area of what lies in it says, and caustic photons are aimed at what is in it.
+    /// it, kernels are as wide as the area of what lies in it says, and caustic photons are aimed at what is in it. What is
+    /// counted or named is that of the whole scene: light comes from there.
     ///
     /// # Errors
     /// As [`Scene::bounds`]; [`Error::InvalidScene`] if there is no surface in it.
@@ -180,7 +181,7 @@ impl SceneSummary {
         let meets = |ball: &BoundingSphere| ball.center.clamp(part.min, part.max).distance(ball.center) <= ball.radius;
         Ok(Self {
             bounds: part,
-            is_part: true,
+            is_part: part.min.cmpgt(whole.bounds.min).any() || part.max.cmplt(whole.bounds.max).any(),
             area,
             total_flux: flux(scene, part.radius()),
             specular_bounds: whole.specular_bounds.iter().copied().filter(meets).collect(),
@@ -245,6 +246,14 @@ fn polygon_area(corners: &[DVec3]) -> f64 {
 
 /// Of what lies in a box: cut at one face after the other (Sutherland and Hodgman 1974).
 fn clipped_area(triangle: &[DVec3; 3], bounds: &SceneBounds) -> f64 {
+    let [a, b, c] = *triangle;
+    let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+    if low.cmpgt(bounds.max).any() || high.cmplt(bounds.min).any() {
+        return 0.0;
+    }
+    if low.cmpge(bounds.min).all() && high.cmple(bounds.max).all() {
+        return polygon_area(triangle);
+    }
     let mut polygon = triangle.to_vec();
     for axis in 0..3 {
         for (face, sign) in [(bounds.min[axis], 1.0), (bounds.max[axis], -1.0)] {
@@ -284,6 +293,7 @@ mod tests {
         assert!((own.bounds.max - center).length() <= radius * (1.0 + 1e-12));
         assert_eq!((all.area, all.total_flux), (own.area, own.total_flux));
     }
+
     #[test]
     fn a_part_has_the_area_within_it_and_what_is_specular_there() {
         let scene = samples::glass_sphere(0.0);
@@ -291,7 +301,7 @@ mod tests {
         let of = |min: DVec3, max: DVec3| SceneSummary::of_part(&scene, SceneBounds::new(min, max).unwrap());
         let (min, max) = (whole.bounds.min, whole.bounds.max);
         let all = of(min, max).unwrap();
-        assert!(all.is_part && (all.area / whole.area - 1.0).abs() < 1e-12);
+        assert!(!all.is_part && (all.area / whole.area - 1.0).abs() < 1e-12);
         assert_eq!(all.specular_bounds.len(), 1);
         // Two parts have all of the area between them.
         let middle = whole.specular_bounds[0].center.x - 1.01 * whole.specular_bounds[0].radius;
@@ -299,6 +309,7 @@ mod tests {
             of(min, max.with_x(middle)).unwrap(),
             of(min.with_x(middle), max).unwrap(),
         ];
+        assert!(left.is_part && right.is_part);
         assert!(((left.area + right.area) / whole.area - 1.0).abs() < 1e-12);
         assert_eq!([left.specular_bounds.len(), right.specular_bounds.len()], [0, 1]);
         let error = of(max + 1.0, max + 2.0).unwrap_err().to_string();
