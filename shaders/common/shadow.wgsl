@@ -6,7 +6,7 @@ const SHADOW_BIAS_TEXELS: f32 = 0.75;
 // And by this much in any case, unit frame: depth and distance are 24-bit numbers near 1.
 const SHADOW_BIAS: f32 = 0x1p-14;
 // No occluder counts as nearer to the lamp than this, unit frame: the near plane of the views that fill shadow maps.
-const SHADOW_NEAREST: f32 = 0x1p-14;
+const SHADOW_NEAREST: f32 = 0x1p-24;
 
 // Where a receiver lies in a light's shadow map.
 struct ShadowProbe {

@@ -5,8 +5,9 @@ use crate::halton::radical_inverse;
 use crate::scene::{Camera, Projection, UnitFrame};
 use glam::{DMat4, DVec3, Mat4, Vec3, Vec4};
 
-/// Distance of the near plane, unit frame: a power of two, so that scaling a scene changes no bit of depth.
-pub(crate) const NEAR: f32 = 1.0 / 16384.0;
+/// Distance of the near plane, unit frame: nearer than numbers near 1 can tell two points apart, and a power of two, so that
+/// depth is that of any other to the bit but for the exponent.
+pub(crate) const NEAR: f32 = 1.0 / 16_777_216.0;
 
 /// Parallel views see from this far before the region's centre to as far behind it, unit frame. What stands further
 /// towards the light does not occlude. Twin of `SURFACE_TEXEL_PARALLEL_START`.

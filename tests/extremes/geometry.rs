@@ -2,7 +2,7 @@
 
 use crate::common::meshes::soup;
 use crate::common::{Component, assert_no_errors};
-use crate::studio::{METHODS, SIZE, WAYS, assert_finite, by_name, error_of, report, studio};
+use crate::studio::{METHODS, SIZE, WAYS, assert_finite, by_name, error_of, mean, report, studio};
 use lightfall::Error;
 use lightfall::glam::{DAffine3, DVec3};
 use lightfall::reference::PathComponent;
@@ -20,7 +20,6 @@ fn with(mesh: Mesh, transform: DAffine3) -> Scene {
 }
 
 #[test]
-#[ignore = "open: by surface lights one triangle lights itself"]
 fn a_scene_needs_triangles_and_one_is_enough() {
     let Some(mut studio) = studio() else { return };
     let Some(studio) = studio.as_mut() else { return };
@@ -41,11 +40,9 @@ fn a_scene_needs_triangles_and_one_is_enough() {
         assert_finite(&all, way.name);
         assert!(all.iter().flatten().any(|&v| v > 0.0), "{}: black", way.name);
         let indirect = studio.picture(way, &[], &scene, SIZE, Component::Indirect).unwrap();
-        assert!(
-            indirect.iter().flatten().all(|&v| v == 0.0),
-            "{}: one triangle lights itself",
-            way.name
-        );
+        // A triangle does not light itself, but for the last digits of what is across its plane.
+        let own = mean(&indirect) / mean(&all);
+        assert!(own < 1e-12, "{}: {own}", way.name);
     }
     assert_no_errors(studio.gpu);
 }

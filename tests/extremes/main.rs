@@ -9,6 +9,7 @@ mod common;
 mod device;
 mod geometry;
 mod light;
+mod long;
 mod maps;
 mod material;
 mod motion;
