@@ -13,6 +13,8 @@ use lightfall::scene::{
     samples,
 };
 use lightfall::{Error, Timestamps, creation_count, wgpu};
+use proptest::prelude::*;
+use proptest::test_runner::{FileFailurePersistence, RngSeed};
 
 /// Runs on a fresh device and fails on any validation error.
 fn on_device<T>(body: impl FnOnce(&wgpu::Device, &wgpu::Queue) -> T) -> T {
@@ -272,6 +274,50 @@ fn settings_out_of_range_are_refused_before_anything_is_made() {
         matches!(&error, Error::UnknownSetting { known, .. } if known.contains("bounces")),
         "{error}"
     );
+}
+
+/// A value as somebody might write it: of another key, a number of any size, or no sense at all.
+fn setting_text() -> impl Strategy<Value = String> {
+    let of_others = Settings::balanced().entries().into_iter().map(|entry| entry.1);
+    prop_oneof![
+        prop::sample::select(of_others.collect::<Vec<_>>()),
+        any::<f32>().prop_map(|number| number.to_string()),
+        any::<i64>().prop_map(|number| number.to_string()),
+        ".*",
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig {
+        cases: 4000,
+        rng_seed: RngSeed::Fixed(7),
+        failure_persistence: Some(Box::new(FileFailurePersistence::WithSource("regressions"))),
+        ..ProptestConfig::default()
+    })]
+
+    #[test]
+    fn settings_of_any_text_are_taken_whole_or_refused_by_name(key in 0..200usize, text in setting_text()) {
+        let before = Settings::balanced();
+        let entries = before.entries();
+        let key = entries[key % entries.len()].0;
+        let mut settings = before.clone();
+        match settings.set(key, &text) {
+            Ok(()) => {
+                settings.validate().unwrap();
+                // What it says of itself makes the same again.
+                let mut again = Settings::fast();
+                for (key, value) in settings.entries() {
+                    again.set(key, &value).unwrap();
+                }
+                prop_assert_eq!(again, settings);
+            }
+            Err(Error::InvalidSetting { key: named, .. }) => {
+                prop_assert_eq!(&named, key);
+                prop_assert_eq!(settings, before);
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
 }
 
 fn texture(device: &wgpu::Device, format: wgpu::TextureFormat, size: [u32; 2], samples: u32) -> wgpu::TextureView {

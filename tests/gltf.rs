@@ -846,6 +846,73 @@ fn wrong_numbers_never_panic() {
     }
 }
 
+/// Every place of a JSON value, as pointers.
+fn pointers(value: &Value, from: &str, found: &mut Vec<String>) {
+    found.push(from.to_owned());
+    match value {
+        Value::Object(map) => map.iter().for_each(|(k, v)| pointers(v, &format!("{from}/{k}"), found)),
+        Value::Array(list) => (0..)
+            .zip(list)
+            .for_each(|(i, v): (usize, _)| pointers(v, &format!("{from}/{i}"), found)),
+        _ => {}
+    }
+}
+
+/// Something else in a place: taken out, doubled, or a value of whatever kind.
+fn mutate(json: &mut Value, place: usize, kind: u8, number: f64) {
+    let mut all = Vec::new();
+    pointers(json, "", &mut all);
+    let pointer = &all[1 + place % (all.len() - 1)];
+    let (parent, key) = pointer.rsplit_once('/').unwrap();
+    let at = json.pointer(pointer).unwrap().clone();
+    let other = match kind {
+        0 | 1 => {
+            match (kind, json.pointer_mut(parent).unwrap()) {
+                (0, Value::Object(map)) => drop(map.remove(key)),
+                (0, Value::Array(list)) => drop(list.remove(key.parse().unwrap())),
+                (_, Value::Array(list)) => list.push(at),
+                (_, Value::Object(map)) => drop(map.insert(format!("{key}2"), at)),
+                _ => {}
+            }
+            return;
+        }
+        2 => Value::Null,
+        3 => json!(number),
+        4 => json!(number as i64),
+        5 => json!([at]),
+        6 => json!({ "a": at }),
+        7 => json!("\u{0}text"),
+        8 => json!(u64::MAX),
+        _ => json!(true),
+    };
+    *json.pointer_mut(pointer).unwrap() = other;
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::test_runner::Config {
+        cases: 6000,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(7),
+        failure_persistence: Some(Box::new(proptest::test_runner::FileFailurePersistence::WithSource("regressions"))),
+        ..Default::default()
+    })]
+
+    #[test]
+    fn files_of_another_structure_never_panic(
+        changes in proptest::collection::vec(
+            (proptest::prelude::any::<usize>(), 0..10u8, -1e10..1e10f64), 1..4
+        ),
+    ) {
+        let mut asset = Asset::rich();
+        for (place, kind, number) in changes {
+            mutate(&mut asset.json, place, kind, number);
+        }
+        match load_slice(&asset.bytes(), None, "changed.glb", 0.3) {
+            Ok(scene) => scene.validate().unwrap(),
+            Err(error) => assert!(error.contains("changed.glb") && !error.contains("panic"), "{error}"),
+        }
+    }
+}
+
 fn assert_no_panic(bytes: &[u8]) {
     if let Err(error) = load_slice(bytes, None, "flipped.glb", 0.3) {
         assert!(!error.contains("panic"), "{error}");

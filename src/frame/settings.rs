@@ -712,6 +712,7 @@ impl Settings {
         self.tracer_kind.uses_env_maps() && self.trace_method.needs_hierarchy()
     }
 
+    /// k and clamp of the density bandwidth, which a fixed one gives way to.
     fn density(&mut self) -> (&mut f32, &mut [f32; 2]) {
         if let Bandwidth::Fixed(_) = self.splatter.bandwidth {
             self.splatter.bandwidth = PhotonSplatterSettings::default().bandwidth;
@@ -722,16 +723,11 @@ impl Settings {
         }
     }
 
-    /// k and clamp of the density bandwidth; zeros while the bandwidth is fixed.
+    /// The same; while the bandwidth is fixed, those that it would give way to.
     fn density_values(&self) -> (f32, [f32; 2]) {
-        match self.splatter.bandwidth {
-            Bandwidth::Density { photons, clamp } | Bandwidth::Screen { photons, clamp } => (photons, clamp),
-            Bandwidth::Fixed(_) => (0.0, [0.0; 2]),
-        }
-    }
-
-    fn is_fixed(&self) -> bool {
-        matches!(self.splatter.bandwidth, Bandwidth::Fixed(_))
+        let mut own = self.clone();
+        let (&mut photons, &mut clamp) = own.density();
+        (photons, clamp)
     }
 }
 
@@ -1200,7 +1196,7 @@ const KNOBS: &[Knob] = &[
             *s.density().0 = v.parse().ok()?;
             Some(())
         },
-        is_valid: |s| s.is_fixed() || (s.density_values().0 > 0.0 && s.density_values().0.is_finite()),
+        is_valid: |s| s.density_values().0 > 0.0 && s.density_values().0.is_finite(),
     },
     Knob {
         name: "splatter.lowest_density",
@@ -1210,9 +1206,7 @@ const KNOBS: &[Knob] = &[
             s.density().1[0] = v.parse().ok()?;
             Some(())
         },
-        is_valid: |s| {
-            s.is_fixed() || (s.density_values().1[0] > 0.0 && s.density_values().1[0] <= s.density_values().1[1])
-        },
+        is_valid: |s| s.density_values().1[0] > 0.0 && s.density_values().1[0] <= s.density_values().1[1],
     },
     Knob {
         name: "splatter.highest_density",
@@ -1222,9 +1216,7 @@ const KNOBS: &[Knob] = &[
             s.density().1[1] = v.parse().ok()?;
             Some(())
         },
-        is_valid: |s| {
-            s.is_fixed() || (s.density_values().1[1].is_finite() && s.density_values().1[0] <= s.density_values().1[1])
-        },
+        is_valid: |s| s.density_values().1[1].is_finite() && s.density_values().1[0] <= s.density_values().1[1],
     },
     Knob {
         name: "splatter.density",
