@@ -165,8 +165,8 @@ pub enum TexelGatherMethod {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct IlluminationMapSettings {
     /// Places to choose, 1 to 16384: what a host gives to [`SurfacePoint::place`](crate::scene::SurfacePoint::place), with a
-    /// texel on either side. More resolve more; what follows a change costs in proportion. 500, 1000, 2000 in a box: 0.39 and
-    /// 0.69 of the error before.
+    /// texel on either side. More resolve more; what follows a change costs in proportion. 1000 instead of 500 in a box: 0.39 of
+    /// the error; 2000 instead of 1000 among pillars: 0.81.
     pub texels: u32,
     /// How and when they are gathered.
     pub gather: TexelGatherSettings,
