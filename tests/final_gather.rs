@@ -23,6 +23,9 @@ use lightfall::resource::*;
 use lightfall::scene::{Camera, LightSources, Projection, SceneSummary, samples};
 use lightfall::{Error, read_rgba32float_blocking, wgpu};
 
+/// That of the plane at distance 1 from the eye: further off than points near the eye, whose differences have no digits.
+const DEPTH: f32 = 1.0 / 16_777_216.0;
+
 /// Photons of hop 1 at these places of the room's walls, whose half extent is `half`, in the unit frame: for each wall,
 /// coordinates in [−1, 1]² and flux.
 fn on_walls(gpu: &Gpu, half: f32, mut places: impl FnMut() -> Vec<([f32; 2], [f32; 3])>) -> Photons {
@@ -393,7 +396,7 @@ fn the_filter_keeps_even_light_and_edges_and_evens_out_noise() {
         let eye = Vec3::from_slice(&view.capture.eye[..3]);
         let wall = move |x: u32, y: u32| {
             let ndc = |i: u32, n: u32| 2.0 * (i as f32 + 0.5) / n as f32 - 1.0;
-            let toward = inverse.project_point3(Vec3::new(ndc(x, size[0]), -ndc(y, size[1]), 0.5)) - eye;
+            let toward = inverse.project_point3(Vec3::new(ndc(x, size[0]), -ndc(y, size[1]), DEPTH)) - eye;
             let to_walls = (Vec3::splat(half).copysign(toward) - eye) / toward;
             to_walls.min_position()
         };

@@ -19,6 +19,9 @@ use lightfall::resource::*;
 use lightfall::scene::{Camera, Instance, Light, Material, Mesh, Projection, Scene, samples};
 use lightfall::{read_buffer_blocking, read_rgba32float_blocking, wgpu};
 
+/// That of the plane at distance 1 from the eye: further off than points near the eye, whose differences have no digits.
+const DEPTH: f32 = 1.0 / 16_777_216.0;
+
 /// A Cornell box whose instances are numbered from 1, each of a reflectance and an emission of its own.
 fn numbered_box() -> Scene {
     let mut scene = samples::cornell(0.0);
@@ -163,7 +166,7 @@ fn irradiance_is_neither_interpolated_nor_evened_out_across_numbers() {
             let inverse = lightfall::glam::Mat4::from_cols_array_2d(&view.inverse_view_projection);
             let ndc = 2.0 * (x as f32 + 0.5) / size[0] as f32 - 1.0;
             let eye = lightfall::glam::Vec3::from_slice(&view.capture.eye[..3]);
-            let toward = inverse.project_point3(lightfall::glam::Vec3::new(ndc, 0.0, 0.5)) - eye;
+            let toward = inverse.project_point3(lightfall::glam::Vec3::new(ndc, 0.0, DEPTH)) - eye;
             let boundary = bench.frame.point(DVec3::ZERO).x;
             (eye - toward * (eye.z - bench.frame.point(DVec3::ZERO).z) / toward.z).x > boundary
         };
