@@ -74,7 +74,7 @@ fn samples_uncovered(lane: u32) -> vec2f {
     var counts = vec2f(0.0);
     for (var word = lane; word < samples_words(); word += LANES) {
         var reachable = 0u;
-        for (var candidate = 0u; candidate < params.candidate_count; candidate++) {
+        for (var candidate = 0u; candidate < min(params.candidate_count, arrayLength(&sights)); candidate++) {
             if sights[candidate].is_valid == 1u {
                 reachable |= seen_by[candidate * CANDIDATE_TEXELS + word];
             }

@@ -206,16 +206,9 @@ fn sum_unseen(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
     }
     let bit = bit_of_candidate(candidate);
     let others = selection.selected & ~select(0u, 1u << (bit & 31u), bit != NONE);
-    if params.sample_count > 0u {
-        let counts = sum_lanes(lane, samples_unseen(candidate, lane, others));
-        if lane == 0u {
-            sights[candidate].unseen = counts.x;
-            sights[candidate].own = counts.y;
-        }
-        return;
-    }
-    var sum = vec2f(0.0);
-    for (var i = lane; i < CANDIDATE_TEXELS; i += LANES) {
+    // By samples, of which there are none by area.
+    var sum = samples_unseen(candidate, lane, others);
+    for (var i = lane; i < CANDIDATE_TEXELS && params.sample_count == 0u; i += LANES) {
         let seen = seen_by[candidate * CANDIDATE_TEXELS + i] & selection.selected;
         let area = candidate_area(candidate_texel(candidate, i));
         sum += vec2f(select(0.0, area, seen == 0u), select(0.0, area, (seen & others) == 0u));
@@ -229,10 +222,7 @@ fn sum_unseen(@builtin(workgroup_id) group: vec3u, @builtin(local_invocation_ind
 
 // Of what valid candidates see: the part that selected maps do not see, and all of it.
 fn uncovered(lane: u32) -> vec2f {
-    var area = vec2f(0.0);
-    if params.sample_count > 0u {
-        area = samples_uncovered(lane);
-    }
+    var area = samples_uncovered(lane);
     for (var i = lane; i < params.candidate_count && params.sample_count == 0u; i += LANES) {
         area += select(vec2f(0.0), vec2f(sights[i].unseen, sights[i].area), sights[i].is_valid == 1u);
     }
