@@ -77,6 +77,7 @@ fn a_light_in_a_solid_lights_nothing_outside_of_it() {
 }
 
 #[test]
+#[ignore = "takes a minute, and memory that the software driver keeps"]
 fn lights_may_stand_outside_of_the_room() {
     let Some(mut studio) = studio() else { return };
     let Some(studio) = studio.as_mut() else { return };
@@ -86,6 +87,7 @@ fn lights_may_stand_outside_of_the_room() {
 
 /// What comes of the place, not of the map there, triangles have as well.
 #[test]
+#[ignore = "takes a minute, and memory that the software driver keeps"]
 fn lights_may_stand_where_maps_do() {
     let Some(mut studio) = studio() else { return };
     let Some(studio) = studio.as_mut() else { return };
@@ -154,6 +156,7 @@ fn spots_may_be_needles_and_half_spaces() {
 
 /// Direct light of a bulb that grows from a point to one that is larger than the room.
 #[test]
+#[ignore = "takes a minute, and memory that the software driver keeps"]
 fn bulbs_may_be_points_and_larger_than_the_room() {
     let Some(mut studio) = studio() else { return };
     let Some(studio) = studio.as_mut() else { return };
@@ -194,6 +197,7 @@ fn bulbs_may_be_points_and_larger_than_the_room() {
 /// What the brighter one lights comes out as without the other; what only the darker one lights is right, too, for flux is
 /// summed where it arrives and nothing of the brighter one comes there.
 #[test]
+#[ignore = "takes a minute, and memory that the software driver keeps"]
 fn a_light_may_be_a_thousand_million_times_as_bright_as_another() {
     let Some(mut studio) = studio() else { return };
     let Some(studio) = studio.as_mut() else { return };

@@ -26,6 +26,7 @@ fn seen(eye: DVec3, target: DVec3, degrees: f64) -> Scene {
 }
 
 #[test]
+#[ignore = "takes a minute, and memory that the software driver keeps"]
 fn the_eye_may_stand_and_look_where_it_likes() {
     let Some(mut studio) = studio() else { return };
     let Some(studio) = studio.as_mut() else { return };
